@@ -6,6 +6,8 @@
 [{"stamp": {"secs": 1, "nsecs": 5}, "name": ["a"], "position": [0.1]}, ...]     a message per row, as of ROS
 {"columns": ["t", "x"], "data": [[0, 0.1], ...]}     a table
 [{"name": "x", "unit": "mm", "values": [...]}, ...]  an object per channel
+[{"meta": {"name": "x", "EGU": "mm"}, "data": [{"secs": 1, "nanos": 5, "val": 0.1}, ...]}, ...]
+{"x": [[0, 0.1], ...], "y": [[0, 1], ...]}           values with stamps of each channel (`json_points`)
 [["t", "x"], [0, 0.1], [1, 0.2]]                     a matrix, with a row of names or without
 {"t": 0, "x": 0.1}                                   one such record in each line
 """
@@ -20,15 +22,14 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
 from hil.files.input_file import MOST_BYTES, check_file, check_values, parsing
+from hil.files.json_points import NAME_KEYS, VALUE_KEYS, first_of, rows_of_points, stamp_of
 
 MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 72 bytes
-_NAME_KEYS, _VALUE_KEYS = ("name", "channel", "id"), ("values", "data", "samples")  # of an object per channel
-_STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec"))
 
 
 @dataclass(frozen=True)
-class JsonContent:
-    """Lists of values, scalars and units of a JSON file, by name."""
+class RecordColumns:
+    """Lists of values, scalars and units of a file of records, by name."""
 
     lists: dict[str, list[Any]]
     scalars: dict[str, float]
@@ -47,7 +48,7 @@ class JsonContent:
             return np.array([np.nan if value is None else value for value in self.lists[name]], dtype=np.float64)
 
 
-def read_json(path: Path) -> JsonContent:
+def read_json(path: Path) -> RecordColumns:
     """Read `path`. Raises InputError: no JSON, or no lists in it."""
     check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
     with parsing(path, "JSON file"):
@@ -59,7 +60,7 @@ def read_json(path: Path) -> JsonContent:
         raise InputError(
             f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
         )
-    return JsonContent(lists, scalars, units)
+    return RecordColumns(lists, scalars, units)
 
 
 def _loaded(path: Path, text: str) -> Any:
@@ -82,25 +83,20 @@ def _loaded(path: Path, text: str) -> Any:
     return rows
 
 
-def _first(row: dict[str, Any], keys: tuple[str, ...], kind: type) -> Any:
-    """The first value under one of `keys` that is of a kind; None without one."""
-    return next((row[key] for key in keys if isinstance(row.get(key), kind)), None)
-
-
 def _flat(row: dict[str, Any]) -> dict[str, Any]:
     """Values of a record by path: fields of objects as KEY.FIELD, elements of lists as KEY.NAME or KEY.0, KEY.1, ...
 
     NAME are the texts of a list `name` of the same length. An object of seconds and nanoseconds is one stamp [s].
     """
-    names: list[Any] = next((row[key] for key in _NAME_KEYS if isinstance(row.get(key), list)), [])
+    names: list[Any] = next((row[key] for key in NAME_KEYS if isinstance(row.get(key), list)), [])
     flat: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, dict):
-            parts = [_first(value, keys, int) for keys in _STAMP_KEYS]
-            if None in parts:
+            stamp = stamp_of(value)
+            if stamp is None:
                 flat |= {f"{key}.{field}": inner for field, inner in _flat(value).items()}
             else:
-                flat[key] = parts[0] + 1e-9 * parts[1]
+                flat[key] = float(stamp)
         elif isinstance(value, list) and value is not names:
             named = len(names) == len(value)
             flat |= {f"{key}.{names[index] if named else index}": one for index, one in enumerate(value)}
@@ -112,8 +108,10 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
 def _collect(
     path: Path, data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]
 ) -> None:
-    if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
-        channels = [(_first(row, _NAME_KEYS, str), _first(row, _VALUE_KEYS, list), row.get("unit")) for row in data]
+    if (points := rows_of_points(data)) is not None:
+        lists.update(points)
+    elif isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
+        channels = [(first_of(row, NAME_KEYS, str), first_of(row, VALUE_KEYS, list), row.get("unit")) for row in data]
         if all(name is not None and values is not None for name, values, _ in channels):  # an object per channel
             lists.update({name: values for name, values, _ in channels})
             units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})

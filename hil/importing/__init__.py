@@ -1,9 +1,11 @@
 """From a foreign file to a recording, in one direction. Without a map, `draft_map` writes one first.
 
 step                 modules                                                     result
-text to rows         number_form, text_rows (for draft and import alike)         `TextRows`
+text to rows         number_form, cell_units, text_lines, text_rows              `TextRows`
                      encodings, header_rows, csv_dialect (for the draft)         `Header`, `CsvDialect`
-file to variables    mat_size, mat_file, mdf_file, long_text, variables          arrays by name
+rows of one value    series_columns (which columns), series (put together)       `SeriesColumns`, `SeriesRows`
+file to variables    mat_size, mat_file, mdf_file, variables                     arrays by name
+file to records      long_text, records; hil.files.json_columns, xml_records     `Records`
 file to table        row_groups, foreign_table (all columns)                     `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`

@@ -8,12 +8,14 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
+from hil.errors import InputError
 from hil.files.input_file import bounded, is_file
 from hil.files.yaml_model import load_model
 from hil.importing.channel_clocks import merge, seconds
-from hil.importing.foreign_columns import FEW_MISSING, read_foreign
+from hil.importing.foreign_columns import FEW_MISSING, Foreign, read_foreign
 from hil.importing.map_file import RecordingMap
 from hil.importing.rows import complete_rows
+from hil.importing.units import base_of
 from hil.importing.wraps import unwrapped
 from hil.recording.quantum import count_of
 from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
@@ -48,7 +50,9 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     on_change = sorted({entry.column for entry in the_map.channels.values() if entry.empty == "hold"})
     sparse = wanted if times else []
     foreign = read_foreign(source, wanted, sorted(gains), the_map.csv, sorted(dates), few, on_change, sparse)
-    given, rows_kept = foreign.columns, None
+    clock_units = {part.column: part.unit for part in clocks}
+    asked = clock_units | {entry.column: entry.unit for entry in the_map.channels.values()}
+    given, rows_kept = _in_units(source, foreign, asked), None
     if the_map.time is not None and times:
         given, rows_kept = merge(source, given, the_map.time, times)
 
@@ -93,6 +97,19 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     if notes := [*foreign.notes, *complete.notes, *rows.notes]:
         metadata[CLOCK_NOTES] = notes
     return Recording(source.stem, columns, rows.period_s, metadata)
+
+
+def _in_units(source: Path, foreign: Foreign, asked: dict[str, str]) -> dict[str, FloatArray]:
+    """Columns (n,) of cells with units in those of the map, `asked`. Raises InputError: one that does not convert."""
+    columns = dict(foreign.columns)
+    for name, own in ((name, foreign.units[name]) for name in asked if name in foreign.units):
+        base, factor = base_of(asked[name])
+        if base != own:
+            raise InputError(
+                f"{source}: {name}: given {asked[name]!r} in the map, its cells hold units of {own}; correct the unit"
+            )
+        columns[name] = columns[name] / factor
+    return columns
 
 
 def _find_map(map_path: str | Path) -> Path:

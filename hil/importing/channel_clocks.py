@@ -18,7 +18,7 @@ from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import HeaderValue
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_file import TimeColumn
-from hil.importing.stamp_columns import growing
+from hil.importing.stamp_columns import counted_on, growing
 
 _CHANNELS = (Quantity.POSITION, Quantity.VELOCITY, Quantity.EFFORT)
 _ROW = 0.01  # of a step: by which two clocks of the same rows differ at most
@@ -97,7 +97,7 @@ def merge(
 
 def seconds(columns: Mapping[str, FloatArray], time: TimeColumn, start: float = 0.0) -> FloatArray:
     """Stamps (n,) [s] of a column less `start`, in its unit, with the fraction of a second."""
-    stamps = (columns[time.column] - start) * time.seconds
+    stamps = (counted_on(columns[time.column], time.wraps_at) - start) * time.seconds
     part = time.fraction
     return np.asarray(stamps + part.seconds * columns[part.column] if part else stamps, dtype=np.float64)
 

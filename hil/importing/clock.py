@@ -15,8 +15,10 @@ from hil.importing.stamp_columns import (
     FASTEST_HZ,
     SLOWEST_HZ,
     Stamps,
+    counted_on,
     fraction_of,
     growing,
+    range_of,
     unit_of_stamps,
     whole_seconds,
 )
@@ -96,6 +98,11 @@ def clock_of(
     if not best.sure:
         best, note = unit_of_stamps(best, labels[best.time.column], known, told)
     notes = [note] if note else []
+    if (size := best.time.wraps_at) is not None:
+        notes.append(
+            f"clock: {best.time.column} starts again at {size:.10g}; it is counted on, which is right if no step "
+            f"between two rows is as long as {size * best.time.seconds:.4g} s"
+        )
     for one in known:
         if one.time.column not in (best.time.column, best.time.fraction and best.time.fraction.column):
             off = abs(one.span_s - best.span_s)
@@ -121,9 +128,10 @@ def _of_intervals(table: ForeignTable, labels: dict[str, Label], name: str) -> t
 
 
 def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
-    unit = "date" if name in table.dates else labels[name].unit
-    time = TimeColumn(column=name, unit=unit or "s", scale=table.scales.get(name, (1.0, 0.0))[0])
-    return Stamps.of(time, table.columns[name], unit is not None)
+    unit, stamps = "date" if name in table.dates else labels[name].unit, table.columns[name]
+    scale, wraps_at = table.scales.get(name, (1.0, 0.0))[0], None if unit == "date" else range_of(stamps)
+    time = TimeColumn(column=name, unit=unit or "s", scale=scale, wraps_at=wraps_at)
+    return Stamps.of(time, stamps, unit is not None)
 
 
 def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
@@ -132,7 +140,7 @@ def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
     Row numbers are none.
     """
     for name, values in table.columns.items():
-        steps = np.diff(values)
+        steps = np.diff(counted_on(values, range_of(values)))
         if labels[name].quantity is Quantity.UNKNOWN and whole_seconds(values):
             return [name]
         if (

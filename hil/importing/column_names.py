@@ -37,13 +37,16 @@ class Label:
         return self.quantity is not Quantity.UNKNOWN
 
 
-def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
-    """Read the name of a column, and the unit and the words that the file gives for it (empty without)."""
+def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bool = False) -> Label:
+    """Read the name of a column, and the unit and the words that the file gives for it (empty without).
+
+    The unit of the name counts first, but for one of the cells themselves.
+    """
     name, unit, odd = split_unit(column.strip())
     if unit is None and not odd:
         name, unit = _unit_after_blank(name)
         unit = unit or whole_unit(name.rpartition(".")[2])
-    if unit_text and unit is None:
+    if unit_text and (unit is None or of_cells):
         unit, odd = unit_of_text(unit_text), unit_of_text(unit_text) is None
     if unit is None and not odd:
         unit = split_unit(words_beside)[1] if _BRACKET.search(words_beside) else None

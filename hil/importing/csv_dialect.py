@@ -10,11 +10,13 @@ from typing import NamedTuple
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
 from hil.files.input_file import lines_of
+from hil.importing.cell_units import has_unit, number_part
 from hil.importing.encodings import encoding_of
 from hil.importing.header_rows import COMMENT, Header, read_header
 from hil.importing.map_file import CsvOptions
 from hil.importing.number_form import NumberForm, find_form, number_of
-from hil.importing.text_rows import split_line
+from hil.importing.series_columns import find_series
+from hil.importing.text_lines import split_line
 
 SAMPLE_LINES = 400  # from the beginning, more than any preamble, and as many from the whole file
 MOST_LINES = 200_000  # read for the draft: minutes of a recording
@@ -35,11 +37,12 @@ class CsvDialect:
 
 
 class _Layout(NamedTuple):
-    """Delimiter, form of the numbers, and for each column if it has numbers or dates in most rows."""
+    """Delimiter, form of the numbers, and for each column if most rows have numbers or dates, and if with units."""
 
     delimiter: str
     form: NumberForm
     read: tuple[bool, ...]
+    units: tuple[bool, ...] = ()
 
 
 def find_dialect(path: Path) -> CsvDialect:
@@ -63,6 +66,9 @@ def find_dialect(path: Path) -> CsvDialect:
         )
     given: dict[str, object] = {"delimiter": delimiter, "decimal_point": form.decimal, "thousands": form.thousands}
     given |= {"encoding": encoding}
+    step = max(1, len(lines) // SAMPLE_LINES)
+    sample = [split_line(line, delimiter) for line in (*lines[first : first + SAMPLE_LINES], *lines[first::step])]
+    given["series"] = find_series(header.names, [row for row in sample if len(row) == width], form)
     if header.line is None or split_line(above[header.line], delimiter) != list(header.names):
         given |= {"skip_lines": first, "column_names": header.names}
     else:
@@ -118,14 +124,17 @@ def _layout(path: Path, body: list[str]) -> _Layout:
             width, rows = wide, [row for row in rows if len(row) == wide]
         if width < 2:
             continue
-        whole = [["" if is_date(field) else field for field in row] for row in rows if len(row) == width]
-        form, share = find_form(whole)
+        whole = [row for row in rows if len(row) == width]
+        plain = [["" if is_date(field) else number_part(field) for field in row] for row in whole]
+        form, share = find_form(plain)
         share *= len(whole) / len(rows)
         # a blank counts only where nothing else separates
         score = (share - (0.01 if delimiter == " " else 0.0), width)
         if score > best:
-            told = ([number_of(field, form) is not None for field in column] for column in zip(*whole, strict=True))
-            best, found = score, _Layout(delimiter, form, tuple(sum(one) > _MOSTLY * len(one) for one in told))
+            told = ([number_of(field, form) is not None for field in column] for column in zip(*plain, strict=True))
+            united = ([has_unit(field) for field in column] for column in zip(*whole, strict=True))
+            read, units = (tuple(sum(one) > _MOSTLY * len(one) for one in each) for each in (told, united))
+            best, found = score, _Layout(delimiter, form, read, units)
     if best[0] < _LEAST_SHARE:
         raise InputError(
             f"{path}: has no rows of numbers in two columns or more, its lines are such as {body[-1].strip()[:60]!r}; "
@@ -146,6 +155,7 @@ def _first_row(path: Path, lines: Sequence[str], layout: _Layout) -> int:
 
 def _is_row(fields: list[str], layout: _Layout) -> bool:
     """True if numbers or dates stand where most rows have them, or nothing."""
-    told = [field for field, is_read in zip(fields, layout.read, strict=False) if is_read]
+    kinds = zip(fields, layout.read, layout.units, strict=False)
+    told = [number_part(field) if units else field for field, is_read, units in kinds if is_read]
     given = [is_date(field) or number_of(field, layout.form) is not None for field in told if field]
     return len(fields) >= len(layout.read) - 1 and bool(given) and all(given)

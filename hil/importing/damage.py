@@ -33,8 +33,9 @@ def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
     for name, values in columns.items():
         if name in table.texts:
             line, text = table.texts[name]
+            number = f"number in {table.cell_units[name]} or a like unit" if name in table.cell_units else "number"
             raise InputError(
-                f"{table.path}:{line}: {name} has text and no number: given {text!r}, allowed a number in each row; "
+                f"{table.path}:{line}: {name} has text and no number: given {text!r}, allowed a {number} in each row; "
                 "import the part of the file before it, or leave the column out by a map"
             )
         if np.isinf(values).any():

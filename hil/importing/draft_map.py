@@ -20,7 +20,7 @@ from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
-from hil.importing.on_change import held, written_on_change
+from hil.importing.on_change import columns_on_change, held
 from hil.importing.roles import find_roles
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
@@ -37,7 +37,7 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     table = read_table(path)
     own = on_one_clock(table, _labels(table))
     table = own.table
-    on_change = [name for name, values in table.columns.items() if written_on_change(values)]
+    on_change = columns_on_change(table.columns)
     filled_up = {name: held(table.columns[name]) for name in on_change}
     distinct = without_duplicates(table.columns | filled_up)
     lines = table.lines[distinct.rows] if table.lines is not None else None
@@ -97,6 +97,11 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
                 for name in used
                 if name in on_change
             ),
+            *(
+                f"{name}: its cells hold their units; they are read in {table.cell_units[name]}"
+                for name in used
+                if name in table.cell_units
+            ),
             *roles.unsure,
             *(f"{name}: its unit is not known" for name, one in labels.items() if one.odd_unit and name in used),
         ],
@@ -113,7 +118,8 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
 
 def _labels(table: ForeignTable) -> dict[str, Label]:
     """Meaning of the columns by all that the file says of them."""
-    told = {name: (table.units.get(name, ""), table.words.get(name, "")) for name in table.columns}
+    units = table.units | table.cell_units
+    told = {name: (units.get(name, ""), table.words.get(name, ""), name in table.cell_units) for name in table.columns}
     return {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
 
 

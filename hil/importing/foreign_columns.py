@@ -1,7 +1,7 @@
 """Read columns of a foreign file by name: CSV, MATLAB .mat to version 7, Parquet, JSON. No map is known here."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,30 +11,36 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.files import json_columns
 from hil.files.date_stamps import seconds_of
 from hil.files.input_file import check_file
 from hil.importing.long_text import long_form
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
-from hil.importing.text_rows import Cell, TextRows, header_names, line_of, read_rows, split_line
-from hil.importing.variables import JSON_ENDINGS, TEXT_ENDINGS, VARIABLE_ENDINGS, load_variables
+from hil.importing.records import RECORD_ENDINGS, read_records
+from hil.importing.text_lines import header_names, line_of, split_line
+from hil.importing.text_rows import Cell, TextRows, read_rows
+from hil.importing.variables import VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
 LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_ENDINGS = (".csv", ".mat", ".parquet", *JSON_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
+_ENDINGS = (".csv", ".mat", ".parquet", *RECORD_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
 @dataclass(frozen=True)
 class Foreign:
-    """Columns of equal length, by name, NaN where a value is missing; `place` gives the place of row i (from 0)."""
+    """Columns of equal length, by name, NaN where a value is missing; `place` gives the place of row i (from 0).
+
+    `units` are those of columns whose cells hold theirs.
+    """
 
     columns: dict[str, FloatArray]
     scalars: dict[str, float]
     place: Callable[[int], str]
     notes: tuple[str, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def check_foreign(path: Path) -> None:
@@ -43,7 +49,7 @@ def check_foreign(path: Path) -> None:
 
 
 def format_of(path: Path) -> str:
-    """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json.
+    """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json (of records).
 
     Raises InputError for another one.
     """
@@ -53,9 +59,9 @@ def format_of(path: Path) -> str:
             f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)}; "
             "export the recording to one of them"
         )
-    if ending in VARIABLE_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
-        return ".mat"
-    return ".csv" if ending in TEXT_ENDINGS else ".json" if ending in JSON_ENDINGS else ending
+    if ending in RECORD_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
+        return ".json"
+    return ".csv" if ending in TEXT_ENDINGS else ".mat" if ending in VARIABLE_ENDINGS else ending
 
 
 def read_foreign(
@@ -85,11 +91,12 @@ def read_foreign(
     columns, scalars, stamps = dict[str, FloatArray](), dict[str, float](), dict[str, FloatArray]()
     lines: NDArray[np.int64] | None = None
     notes: tuple[str, ...] = ()
+    units = dict[str, str]()
     match format_of(path):
         case ".csv":
             rows = read_rows(path, header_names(path, options), options)
             columns, stamps = _chosen(path, rows, wanted, dates)
-            lines, notes = rows.lines, rows.notes
+            lines, notes, units = rows.lines, rows.notes, rows.units
         case ".mat":
             variables = load_variables(path).arrays
             columns = {name: mat_column(path, variables, name) for name in wanted}
@@ -99,7 +106,10 @@ def read_foreign(
             columns = {name: numbers(path, table, name) for name in wanted}
             stamps = {name: parquet_dates(path, name) for name in dates}
         case _:
-            content = json_columns.read_json(path)
+            records = read_records(path)
+            content, notes, units = records.columns, records.notes, records.cell_units
+            for name in wanted:
+                _refuse_text(path, name, records.texts.get(name), "finite number")
             columns = {name: content.numbers(path, name) for name in wanted}
             stamps = {name: seconds_of([str(text) for text in content.lists.get(name, [])]) for name in dates}
 
@@ -113,12 +123,13 @@ def read_foreign(
         if lines is None:
             return f"{(columns | stamps)[name][row]}"
         text = split_line(line_of(path, int(lines[row]), options.encoding), options.delimiter)
-        names = header_names(path, options)
-        return repr(text[names.index(name)]) if names.index(name) < len(text) else "no field"
+        column = options.series.value if options.series and name != options.series.time else name
+        index = header_names(path, options).index(column)
+        return repr(text[index]) if index < len(text) else "no field"
 
     checked = {name: values for name, values in (columns | stamps).items() if name not in sparse}
     _check(checked, path, place, given, missing)
-    return Foreign(columns | stamps, scalars, place, notes)
+    return Foreign(columns | stamps, scalars, place, notes, units)
 
 
 def _chosen(
@@ -131,12 +142,18 @@ def _chosen(
             raise InputError(f"{path}: column {name!r} is missing; the file has {listed(names)}")
         of_kind = name in (rows.dates if name in dates else rows.numbers)
         if name in rows.texts or not of_kind:
-            line, text = rows.texts.get(name, Cell(int(rows.lines[0]), "dates" if name in rows.dates else "numbers"))
-            raise InputError(
-                f"{path}:{line}: {name}: given {text!r}, allowed a {'date' if name in dates else 'finite number'}; "
-                "leave the column out of the map, or import the part of the file before it"
-            )
+            kind = Cell(int(rows.lines[0]), "dates" if name in rows.dates else "numbers")
+            number = "number with its unit" if name in rows.units else "finite number"
+            _refuse_text(path, name, rows.texts.get(name, kind), "date" if name in dates else number)
     return {name: rows.numbers[name] for name in wanted}, {name: rows.dates[name] for name in dates}
+
+
+def _refuse_text(path: Path, name: str, cell: Cell | None, allowed: str) -> None:
+    if cell is not None:
+        raise InputError(
+            f"{path}:{cell.line}: {name}: given {cell.text!r}, allowed a {allowed}; "
+            "leave the column out of the map, or import the part of the file before it"
+        )
 
 
 def as_measured(values: NDArray[Any]) -> FloatArray:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.files import json_columns
 from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
 from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
@@ -20,6 +19,7 @@ from hil.importing.header_rows import read_factor
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import SECONDS, CsvOptions
+from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
@@ -39,8 +39,8 @@ class ForeignTable:
     `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
     or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what lines above say
     of it, `titles` its text in the file where the column has another name. `scales` are factor and offset that the file
-    gives for a column, `periods_s` the periods of its rows. `notes` say what is left out; `lines` (n,) are those of the
-    rows.
+    gives for a column, `periods_s` the periods of its rows, `cell_units` the units of columns whose cells hold theirs.
+    `notes` say what is left out; `lines` (n,) are those of the rows.
     """
 
     path: Path
@@ -58,6 +58,7 @@ class ForeignTable:
     periods_s: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     lines: NDArray[np.int64] | None = None
+    cell_units: dict[str, str] = field(default_factory=dict)
 
     def place(self, row: int) -> str:
         """Place of a row (from 0) of the numbers in the file."""
@@ -69,7 +70,7 @@ def read_table(path: Path) -> ForeignTable:
     check_foreign(path)
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
-    readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _json}
+    readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _records}
     read = readers[format_of(path)](path)
     table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
@@ -95,12 +96,13 @@ def _text(path: Path) -> ForeignTable:
         header.notes.append(group.note)
     columns, remarks = dict[str, FloatArray](), []
     read = rows.numbers | rows.dates
-    for name, values in ((name, read[name]) for name in header.names):
+    names = tuple(read) if options.series else header.names
+    for name, values in ((name, read[name]) for name in names):
         if np.isfinite(values).mean() > LEAST_NUMBERS:
             columns[name] = values
         elif name in rows.texts:
             remarks.append(f"{name}: text such as {rows.texts[name].text!r}, no numbers")
-    titles = {name: header.titles.get(name, name) for name in header.names}
+    titles = {name: header.titles.get(name, name) for name in names}
     told = described(dialect.above, list(titles.values()))
     of_lines = {title: unit for title, (_, unit) in told.items()} | told_units(dialect.above, list(titles.values()))
     applied = [name for name, scale in header.row_scales.items() if not _is_raw(read[name], *scale)]
@@ -112,7 +114,7 @@ def _text(path: Path) -> ForeignTable:
     ]
     for name, title in titles.items():
         read_factor(header, name, of_lines.get(title, ""))
-    units = {name: of_lines[title] for name, title in titles.items() if title in of_lines} | header.units
+    units = {name: of_lines[title] for name, title in titles.items() if title in of_lines} | header.units | rows.told
     words = {name: told[title][0] for name, title in titles.items() if title in told} | header.words
     return ForeignTable(
         path,
@@ -129,6 +131,7 @@ def _text(path: Path) -> ForeignTable:
         periods_s=header.periods_s,
         notes=(*header.notes, *rows.notes),
         lines=rows.lines,
+        cell_units=rows.units,
     )
 
 
@@ -197,8 +200,9 @@ def _parquet(path: Path) -> ForeignTable:
     return ForeignTable(path, columns, units, remarks=tuple(remarks), dates=frozenset(dates))
 
 
-def _json(path: Path) -> ForeignTable:
-    content = json_columns.read_json(path)
+def _records(path: Path) -> ForeignTable:
+    records = read_records(path)
+    content = records.columns
     columns, remarks = {}, []
     dates = set[str]()
     for name, values in content.lists.items():
@@ -219,6 +223,9 @@ def _json(path: Path) -> ForeignTable:
         constants=constants,
         remarks=tuple(remarks),
         dates=frozenset(dates),
+        texts=records.texts,
+        notes=records.notes,
+        cell_units=records.cell_units,
     )
 
 

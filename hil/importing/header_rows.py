@@ -14,7 +14,7 @@ from hil.importing.column_names import label, plain_words
 from hil.importing.lexicon import Quantity, RowKind, lexicon
 from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
-from hil.importing.text_rows import shown, split_line, times_of_groups
+from hil.importing.text_lines import shown, split_line, times_of_groups
 from hil.importing.units import factor_and_unit, unit_named, unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")

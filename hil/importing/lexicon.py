@@ -111,6 +111,16 @@ class ScalarNames(_Entry):
     constant: Words
 
 
+class SeriesWords(_Entry):
+    """Words in the names of columns of rows of one value each, and beginnings of the texts of a bad quality."""
+
+    name: Words
+    value: Words
+    unit: Words
+    quality: Words
+    bad: Words
+
+
 class Lexicon(_Entry):
     """The content of `lexicon.yaml`, words of all languages together; the file explains its keys."""
 
@@ -135,6 +145,7 @@ class Lexicon(_Entry):
     other_constants: Words
     joints: Words
     scalars: ScalarNames
+    series: SeriesWords
     missing: Words
     infinite: Words
     rows: dict[RowKind, Annotated[str, BeforeValidator(_pattern)]]

@@ -39,6 +39,21 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class SeriesColumns(_Strict):
+    """The columns of a table with one value in each row. A channel has the texts of `names`, joined by points."""
+
+    time: str = Field(description="column of the stamps")
+    names: tuple[str, ...] = Field(min_length=1, description="columns whose texts name the channel")
+    value: str = Field(description="column of the values")
+    unit: str | None = Field(default=None, description="column of the units of the values")
+    quality: str | None = Field(default=None, description="column of their quality: bad values are left out")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All of them."""
+        return tuple(name for name in (self.time, *self.names, self.value, self.unit, self.quality) if name)
+
+
 class CsvOptions(_Strict):
     """Format of a CSV file."""
 
@@ -51,6 +66,7 @@ class CsvOptions(_Strict):
     )
     column_names: tuple[str, ...] | None = Field(default=None, description="names for a file without a header")
     encoding: str = Field(default="utf-8", description="of the text")
+    series: SeriesColumns | None = Field(default=None, description="columns of rows of one value each")
     only: dict[str, str] = Field(default={}, description="rows to take, of one joint: column -> its text in them")
 
 
@@ -62,6 +78,9 @@ class TimeColumn(_Strict):
         description="of the stamps; d: days, date: text such as 2024-03-01 12:00:00.001 or 12:00:00.001"
     )
     scale: PositiveFloat = Field(default=1.0, description="factor beside the unit")
+    wraps_at: PositiveFloat | None = Field(
+        default=None, description="range of a counter that starts again, in the unit of the column"
+    )
     fraction: Self | None = Field(default=None, description="column of the part of a second, added to this one")
 
     @property

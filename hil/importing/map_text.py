@@ -17,7 +17,7 @@ _KEYS = """\
 #   scale   factor beside the unit (1);  offset: added afterwards, in SI (0)
 #   empty   hold: an empty cell stands for the value before, of a column that is written on change
 #   time    column and unit of its own stamps; it is then interpolated to those of the file
-#   wraps_at                                  range of a counter or angle that starts again, in the unit of the column
+#   wraps_at                                  range of a counter (also of time) or angle that starts again, in its unit
 #   counts_per_rev, counts_per_m              for the unit counts
 #   torque_constant_n_m_a, force_constant_n_a for the unit A
 #   rated   N m or N at 100 %, for the units % and permille;  gain: N m or N per volt, for the unit V

@@ -11,6 +11,7 @@ from hil.arrays import FloatArray
 from hil.importing.held_samples import kept_rows, lost_samples, slower
 from hil.importing.slow_gaps import late_stamps, moving_little, with_gaps_filled
 from hil.importing.spikes import lone_values
+from hil.importing.stamp_columns import counted_on, range_of
 from hil.recording.stamps import LARGEST, REPEATS, RegularRows, regular_rows
 
 
@@ -29,7 +30,8 @@ def without_duplicates(columns: Mapping[str, FloatArray]) -> KeptRows:
     Without a column that grows in all other rows, equal rows are those of an axis at rest.
     """
     same = np.r_[False, np.logical_and.reduce([np.diff(values) == 0.0 for values in columns.values()])]
-    stamped = any(bool(np.all(np.diff(values[~same]) > 0.0)) for values in columns.values())
+    distinct = [values[~same] for values in columns.values()]
+    stamped = any(bool(np.all(np.diff(counted_on(one, range_of(one))) > 0.0)) for one in distinct)
     if not same.any() or same.mean() > REPEATS or not stamped:
         return KeptRows(dict(columns), np.arange(same.size), ())
     note = (

@@ -1,4 +1,4 @@
-"""One column of stamps: its unit, its digits, and the fraction of a second in another column."""
+"""One column of stamps: its unit, its digits, its range, and the fraction of a second in another column."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -8,7 +8,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.importing.column_names import Label
 from hil.importing.map_file import SECONDS, TimeColumn
-from hil.recording.stamps import REPEATS
+from hil.recording.stamps import GAP_STEPS, REPEATS
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 2e5  # of recordings of an axis: outside lies a wrong unit of the stamps
 SLOWEST_TOLD_HZ = 2.0  # with a unit in the name
@@ -20,6 +20,9 @@ _NEARLY_ALL = 0.99
 # Seconds from the beginning of a clock's count to 1970: of Unix, of Windows (1601), of .NET (year 1).
 _EPOCHS_S = {"s": (0.0,), "ms": (0.0,), "us": (0.0,), "ns": (0.0,), "100 ns": (11644473600.0, 62135596800.0)}
 _YEAR_S = 365.25 * 86400.0
+# Ranges of counters of time: of 16 to 32 bits, in their unit or as a number of larger ones; seconds of a day.
+_RANGES = (86400.0, 86400e3, *(2.0**bits * per for bits in (15, 16, 24, 31, 32) for per in (1.0, 1e-3, 1e-6)))
+_AGAIN = 0.25  # most rows of a counter that start again: of more the steps between rows are not known
 _SINCE, _UNTIL = 30.0 * _YEAR_S, 130.0 * _YEAR_S  # 2000 to 2100
 
 
@@ -35,6 +38,7 @@ class Stamps:
     @classmethod
     def of(cls, time: TimeColumn, stamps: FloatArray, sure: bool) -> Self:
         """Stamps of one column (n,) in its unit, from 0 where they count from long ago."""
+        stamps = counted_on(stamps, time.wraps_at)
         good = stamps[np.isfinite(stamps)]
         start = float(good[0]) if good.size and time.unit != "date" else 0.0
         seconds = (stamps - start) * time.seconds
@@ -65,8 +69,35 @@ class Stamps:
         return float(np.min(steps[steps > 0.0], initial=self.span_s))
 
 
+def range_of(stamps: FloatArray) -> float | None:
+    """Range of a counter of time (n,) that starts again, such as 2^32; None where stamps fall by anything else.
+
+    Over each fall, of more than half of it, it goes on by one step of the rows, or by some where rows are missing.
+    """
+    good = stamps[np.isfinite(stamps)]
+    steps = np.diff(good)
+    falls, rises = steps[steps < 0.0], steps[steps > 0.0]
+    if not falls.size or falls.size > _AGAIN * steps.size or not rises.size:
+        return None
+    usual, span = float(np.median(rises)), float(np.ptp(good))
+    least, most = -float(falls.max()), -float(falls.min())
+    fitting = [size for size in _RANGES if max(span, most) < size < min(least + GAP_STEPS * usual, 2.0 * least)]
+    return min(fitting, key=lambda size: abs(float(np.median(falls)) + size - usual), default=None)
+
+
+def counted_on(stamps: FloatArray, size: float | None) -> FloatArray:
+    """Stamps (n,) of a counter of a range `size` that starts again, without its falls; NaN stays."""
+    if size is None:
+        return stamps
+    good = np.flatnonzero(np.isfinite(stamps))
+    counted = stamps.copy()
+    counted[good[1:]] += size * np.cumsum(np.diff(stamps[good]) < -0.5 * size)
+    return counted
+
+
 def growing(stamps: FloatArray) -> bool:
     """True for stamps (n,) that go forwards for most of their way; a fraction of a second begins again and again."""
+    stamps = counted_on(stamps, range_of(stamps))
     steps = np.diff(stamps[np.isfinite(stamps)])
     return bool(steps.sum() > _FORWARDS * np.abs(steps).sum())
 
@@ -96,7 +127,7 @@ def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> S
         return None
     if np.quantile(steps, _NEARLY_ALL) > _UNEVEN * np.median(steps):
         return None
-    time = TimeColumn(column=coarse.time.column, unit=coarse.time.unit, fraction=TimeColumn(column=name, unit=unit))
+    time = coarse.time.model_copy(update={"fraction": TimeColumn(column=name, unit=unit)})
     return Stamps(time, seconds, 0.0, True)
 
 
@@ -127,7 +158,7 @@ def unit_of_stamps(
         if any(_SINCE < stamps.first * SECONDS[unit] - start < _UNTIL for start in starts) and _is_rate(step, unit):
             return in_unit(unit), ""
     if rate is not None and told.unit is None:
-        scaled = TimeColumn(column=stamps.time.column, unit="s", scale=1.0 / (rate[0] * step))
+        scaled = stamps.time.model_copy(update={"unit": "s", "scale": 1.0 / (rate[0] * step)})
         note = f"clock: the unit of {told.column!r} is not given; {rate[1]}, so that a step of {step:g} is one period"
         return replace(stamps, time=scaled, seconds=raw * scaled.scale, sure=True), note
     unit, note = unit_by_step(told, step)

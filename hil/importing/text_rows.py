@@ -4,14 +4,11 @@ A line without a number is a message, and everything after the last complete row
 left out, and said. Any other line that is no row is damaged.
 """
 
-import csv
-import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -22,15 +19,16 @@ from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.files.date_stamps import is_date, read_dates
 from hil.files.input_file import lines_of
-from hil.importing.map_file import CsvOptions
+from hil.importing.cell_units import read_cells, tell_units
+from hil.importing.map_file import CsvOptions, SeriesColumns
 from hil.importing.number_form import NumberForm, numbers_of
+from hil.importing.series import series_rows
+from hil.importing.text_lines import line_of, of_terminal, open_text, shown, split_line, times_of_groups
 
 _CHUNK = 20_000  # lines that are read at once
 _MOSTLY = 0.5  # share of numbers from which text in a column is out of place
 _LONGEST = 50  # lines of a footer: more are a column that has no numbers any more
 _JOINTS = 20  # most different names in turn
-_ARROW = "->"
-_SHOWN = 60  # characters of a line in a message
 
 
 class Cell(NamedTuple):
@@ -44,7 +42,8 @@ class Cell(NamedTuple):
 class TextRows:
     """Columns (n,) of numbers, NaN without one; columns of dates [s]; lines (n,) from 1.
 
-    `texts` is the first text of a column that is no number, `in_turn` the texts of one whose few texts alternate.
+    `texts` is the first text of a column that is no number, `in_turn` the texts of one whose few texts alternate,
+    `units` those of columns whose cells hold theirs, `told` those of channels in a unit that is not known.
     """
 
     numbers: dict[str, FloatArray]
@@ -53,75 +52,21 @@ class TextRows:
     lines: NDArray[np.int64]
     notes: tuple[str, ...]
     in_turn: dict[str, tuple[str, ...]] = field(default_factory=dict)
-
-
-def open_text(path: Path, encoding: str) -> TextIO:
-    """Open a text file, whose characters may be damaged. Raises InputError: an unknown encoding."""
-    try:
-        return path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding, errors="replace", newline="")
-    except LookupError:
-        raise InputError(
-            f"{path}: given the encoding {encoding!r}, allowed one that Python knows; give utf-8 or latin-1"
-        ) from None
-
-
-def split_line(line: str, delimiter: str) -> list[str]:
-    """Fields of a line; the delimiter " " stands for one or more blanks."""
-    if _of_terminal(line):
-        stamp, _, rest = line.partition(_ARROW)
-        return [stamp.strip(), *split_line(rest.strip(), delimiter)]
-    if delimiter == " ":
-        return line.split()
-    if '"' not in line:
-        return [field.strip() for field in line.replace("\0", "").rstrip("\r\n").split(delimiter)]
-    try:
-        row = next(csv.reader([line.replace("\0", "").rstrip("\r\n")], delimiter=delimiter, skipinitialspace=True), [])
-    except csv.Error:
-        return [line]
-    return [field.strip() for field in row]
-
-
-def _of_terminal(line: str) -> bool:
-    """True for a line before which a terminal wrote the time of its host: 12:00:00.123 -> 1.5; it may be cut."""
-    stamp, arrow, _ = line.partition(_ARROW)
-    return bool(arrow) and is_date(stamp)
-
-
-def times_of_groups(fields: Sequence[str]) -> tuple[int, ...]:
-    """Places of the columns of time by a row that has the same text over each: Time;x;Time (2);M;Q; () else."""
-    stems = [re.sub(r"[\d.]+| \(\d+\)", "", field) for field in fields]
-    places = tuple(index for index, stem in enumerate(stems) if stem == stems[0])
-    apart = all(second - first > 1 for first, second in pairwise(places))
-    return places if len(places) > 1 and stems[0] and apart and places[-1] < len(stems) - 1 else ()
-
-
-def header_names(path: Path, options: CsvOptions) -> tuple[str, ...]:
-    """Names of the columns by the options of a map. Raises InputError: an empty file, a name that stands twice."""
-    if options.column_names is not None:
-        return options.column_names
-    with open_text(path, options.encoding) as file:
-        lines = enumerate(islice(lines_of(path, file), options.skip_lines, None), options.skip_lines + 1)
-        number, header = next(((number, line) for number, line in lines if line.strip()), (0, ""))
-    names = tuple(split_line(header, options.delimiter))
-    if not names:
-        raise InputError(f"{path}: the file is empty; give a file with a header and rows of numbers")
-    repeated = next((name for name, times in Counter(names).items() if name and times > 1), None)
-    if repeated is not None:
-        raise InputError(
-            f"{path}:{number}: {repeated!r} stands twice in the header, allowed once; give all names in the map: "
-            "csv.column_names, with skip_lines up to the numbers"
-        )
-    return names
+    units: dict[str, str] = field(default_factory=dict)
+    told: dict[str, str] = field(default_factory=dict)
 
 
 def read_rows(path: Path, names: Sequence[str], options: CsvOptions, most: int | None = None) -> TextRows:
-    """Read all columns, or the first `most` rows of them. Raises InputError: a damaged row, with its line and text."""
+    """Read all columns, or the first `most` rows of them; of one value each all rows, for channels may stand in turn.
+
+    Raises InputError: a damaged row, with its line and text.
+    """
     reader = _Reader(path, tuple(names), options)
     with open_text(path, options.encoding) as file:
         lines = enumerate(islice(lines_of(path, file), options.skip_lines, None), options.skip_lines + 1)
         below = (one for one in lines if one[1].strip())
         skip = (options.column_names is None) + options.skip_rows
-        rows = islice(below, skip, skip + most if most else None)
+        rows = islice(below, skip, skip + most if most and not options.series else None)
         while block := list(islice(rows, _CHUNK)):
             reader.take(block)
     return reader.finish()
@@ -137,8 +82,12 @@ class _Reader:
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.parts: dict[str, list[FloatArray]] = {name: [] for name in names}
-        self.fields: dict[str, list[str]] = {}  # of columns of dates, which are read as a whole
+        # of columns of dates and of series, which are read as a whole
+        self.series = options.series
+        self.fields: dict[str, list[str]] = {name: [] for name in (self.series.columns if self.series else ())}
         self.texts: dict[str, dict[int, str]] = {name: {} for name in names}  # by row
+        self.units = dict[str, str | None].fromkeys(names)
+        self.units_of: dict[str, str] = {}  # column of the units beside each column
         self.others: list[tuple[int, str, bool]] = []  # lines that are no rows: number, text, damaged
         self.converted = 0
 
@@ -151,7 +100,7 @@ class _Reader:
 
     def _take_plain(self, block: Sequence[tuple[int, str]]) -> bool:
         """Take lines at once, in a fifth of the time, if all of them are rows of finite numbers; else none of them."""
-        if self.groups or self.only or self.fields or self.form.thousands:
+        if self.groups or self.only or self.fields or self.form.thousands or any(self.units.values()):
             return False
         blanks = self.delimiter == " "
         text = "\n".join(" ".join(line.split()) if blanks else line.rstrip("\r\n") for _, line in block)
@@ -170,6 +119,7 @@ class _Reader:
             return False
         for name, values in zip(self.names, columns, strict=True):
             self.parts[name].append(values)
+            self.units[name] = ""
         self.lines += [number for number, _ in block]
         self.converted += len(block)
         return True
@@ -185,7 +135,8 @@ class _Reader:
         elif given > width and self._numbers(extra):
             self.others.append((number, line, True))
         elif given < width and not self.groups:
-            cut = not any(self._words(field) for field in fields) and not _of_terminal(line)
+            cut = self._stamped(fields) or not any(self._words(field) for field in fields)
+            cut = cut and not of_terminal(line)
             self.others.append((number, line, cut))
         else:
             self.rows.append(fields[:width] + [""] * (width - given))
@@ -195,23 +146,61 @@ class _Reader:
         values, _ = numbers_of(fields, self.form)
         return bool(np.isfinite(values).any()) or any(is_date(field) for field in fields)
 
+    def _stamped(self, fields: Sequence[str]) -> bool:
+        """True for a line of a series that has a stamp where its rows have it."""
+        place = self.names.index(self.series.time) if self.series and self.series.time in self.names else len(fields)
+        return self._numbers(fields[place : place + 1])
+
     def _words(self, field: str) -> bool:
         return bool(numbers_of([field], self.form)[1]) and not is_date(field)
 
     def _convert(self) -> None:
         if not self.rows:
             return
-        for name, column in zip(self.names, zip(*self.rows, strict=True), strict=True):
+        columns = dict(zip(self.names, zip(*self.rows, strict=True), strict=True))
+        if not self.converted and not self.series:
+            self.units_of = {
+                name: beside
+                for name, beside in pairwise(self.names)
+                if tell_units(beside, columns[beside], columns[name], self.form)
+            }
+        for name, column in columns.items():
+            if self.series and name not in self.fields:
+                continue
             if name in self.fields or (not self.converted and any(is_date(field) for field in column[:3])):
                 self.fields.setdefault(name, []).extend(column)
                 continue
-            values, texts = numbers_of(column, self.form)
+            cells: Sequence[str] = column
+            if name in self.units_of:
+                both = zip(column, columns[self.units_of[name]], strict=True)
+                cells = [f"{one} {unit}".strip() for one, unit in both]
+            values, texts, self.units[name] = read_cells(cells, self.form, self.units[name])
             self.parts[name].append(values)
             self.texts[name] |= {self.converted + row: text for row, text in texts.items()}
         self.converted += len(self.rows)
         self.rows = []
 
     def finish(self) -> TextRows:
+        self._refuse_cut()
+        return self._of_series(self.series) if self.series else self._of_rows()
+
+    def _of_series(self, of: SeriesColumns) -> TextRows:
+        """Rows of one value each as those of all channels."""
+        found = series_rows(self.path, self.fields, lambda row: f"{self.path}:{self.lines[row]}", of, self.form)
+        lines = np.array(self.lines, dtype=np.int64)
+        others = sorted([number for number, _, _ in self.others] + lines[found.others].tolist())
+        stamps = {of.time: found.stamps}
+        return TextRows(
+            found.columns | ({} if found.dates else stamps),
+            stamps if found.dates else {},
+            {name: Cell(int(lines[row]), text) for name, (row, text) in found.texts.items()},
+            lines[found.rows],
+            (*self._notes(others, lines), *found.notes),
+            units=found.units,
+            told=found.told,
+        )
+
+    def _of_rows(self) -> TextRows:
         rows = self.converted
         read = {name: read_dates(fields) for name, fields in self.fields.items()}
         dates = {name: one.seconds for name, one in read.items()}
@@ -228,7 +217,6 @@ class _Reader:
         last = int(complete[-1]) if complete.size and rows - complete[-1] <= _LONGEST else rows - 1
         kept = ~(wrong & ~told) & (np.arange(rows) <= last)
         lines = np.array(self.lines, dtype=np.int64)
-        self._refuse_cut()
         texts = {
             name: Cell(int(lines[first]), self.texts[name][first])
             for name in (*numbers, *dates)
@@ -242,6 +230,7 @@ class _Reader:
             lines[kept],
             (*self._notes(others, lines[kept]), *dict.fromkeys(one.note for one in read.values() if one.note)),
             {name: told for name in numbers if (told := _in_turn(list(self.texts[name].values()), rows))},
+            {name: unit for name, unit in self.units.items() if unit},
         )
 
     def _refuse_cut(self) -> None:
@@ -277,15 +266,3 @@ def _in_turn(texts: list[str], rows: int) -> tuple[str, ...]:
     changes = sum(one != other for one, other in pairwise(texts))
     counts = [texts.count(one) for one in different]
     return different if changes > _MOSTLY * rows and max(counts) < 2 * min(counts) else ()
-
-
-def line_of(path: Path, number: int, encoding: str) -> str:
-    """Text of a line (from 1) of a file."""
-    with open_text(path, encoding) as file:
-        return next(islice(lines_of(path, file), number - 1, None), "")
-
-
-def shown(line: str) -> str:
-    """Beginning of a line for a message."""
-    text = line.strip()
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

@@ -41,6 +41,13 @@ def unit_named(text: str) -> str | None:
     return "counts" if unit_of.get(_BITS.sub("", key)) == "counts" else unit_of.get(key)
 
 
+def base_of(unit: str) -> tuple[str, float]:
+    """Unit in which all units of the quantity of `unit` can be told, SI where there is one, and the factor to it."""
+    if unit in ("mA", "mV"):
+        return unit[1:], 1e-3
+    return ("%", 0.1) if unit == "permille" else UNITS.get(unit, (unit, 1.0))
+
+
 def unit_of_text(text: str) -> str | None:
     """Unit of a text that says nothing else, with a quantity before or behind it: Nm (Torque), Angle [deg]."""
     whole = unit_named(text.strip(" []()"))
@@ -81,7 +88,9 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
 
 
 def whole_unit(name: str) -> str | None:
-    """Unit of a time, a torque, an angle or its speed that is the whole name of a column: ms, Nm, turns, rpm."""
+    """Unit that is the whole name of a column: of a time, torque, current, angle, its speed, or counts."""
     unit, letters = unit_named(name), len(name.strip())
     si = UNITS.get(unit or "", ("",))[0]
-    return unit if (si in ("rad", "rad/s") and letters >= LEAST_ALONE) or (si in ("s", "N m") and letters > 1) else None
+    turns = si in ("rad", "rad/s") and letters >= LEAST_ALONE
+    several = unit == "counts" and re.search(r"(?<!tick)s\s*$", name.lower())  # one is the number of a row
+    return unit if turns or several or ((si in ("s", "N m") or unit in ("A", "mA")) and letters > 1) else None

@@ -1,24 +1,17 @@
-"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4), XML of records, text of
-one value in each line."""
+"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4)."""
 
 import zipfile
-from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.lib import format as npy_format
 
 from hil.files.input_file import check_values, parsing
-from hil.importing.long_text import long_form, read_long
 from hil.importing.mat_file import load_mat
 from hil.importing.mdf_file import load_mdf
 
-TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
-JSON_ENDINGS = (".json", ".jsonl", ".ndjson")
-VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4", ".xml")
-_WHOLE_NAN = 0x7FF0_0000_0000_0000  # an IEEE 754 number without a value, whose bits were written as a whole number
+VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4")
 
 
 class Variables(NamedTuple):
@@ -36,16 +29,8 @@ def load_variables(path: Path) -> Variables:
         case ".npy" | ".npz":
             with parsing(path, "NumPy file"):
                 return Variables(_numpy(path), {})
-        case ".mf4":
-            return Variables(*load_mdf(path))
-        case ending if ending in TEXT_ENDINGS:
-            with parsing(path, "text with a value per line"):
-                form = long_form(path)
-                assert form is not None, "its form has changed"
-                return Variables(read_long(path, form), {"time": "s"})
         case _:
-            with parsing(path, "XML file of records"):
-                return Variables(_records(path), {})
+            return Variables(*load_mdf(path))
 
 
 def _numpy(path: Path) -> dict[str, Any]:
@@ -77,40 +62,3 @@ def _check_array(path: Path, file: Any) -> int:
     values = int(np.prod([float(size) for size in shape])) * max(1, dtype.itemsize // 8)
     check_values(path, values, f"an array of {' x '.join(map(str, shape))}")
     return values
-
-
-def _records(path: Path) -> dict[str, Any]:
-    """Attributes with numbers of the element that stands most often, a record per element; NaN where one has none.
-
-    The name of an attribute is the description or name of an element whose id it is: SINUMERIK Trace writes
-    <dataSignal id="f1" name="..." description="..."/> before <rec time="0" f1="1.5"/>.
-    """
-    records = list[dict[str, str]]()
-    names, tags = dict[str, str](), Counter[str]()
-    for _, element in ElementTree.iterparse(path):
-        tags[element.tag] += 1
-        if "id" in element.attrib:
-            given = (element.get(key, "").strip() for key in ("description", "name"))
-            names[element.attrib["id"]] = next((text for text in given if text), element.attrib["id"])
-        elif element.attrib:
-            records.append({"": element.tag} | element.attrib)
-        element.clear()
-    most = next((tag for tag, _ in tags.most_common() if any(one[""] == tag for one in records[-1:])), "")
-    rows = [one for one in records if one[""] == most]
-    keys = [key for key in dict.fromkeys(key for one in rows for key in one) if key]
-    check_values(path, len(rows) * len(keys), f"{len(rows)} records of {len(keys)} values")
-    titles = Counter(names.get(key, key) for key in keys)
-    return {
-        names.get(key, key) if titles[names.get(key, key)] == 1 else f"{names.get(key, key)} {key}": np.array(
-            [_number(one.get(key, "")) for one in rows]
-        )
-        for key in keys
-    }
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text.replace(",", "."))
-    except ValueError:
-        return float("nan")
-    return float("nan") if value >= _WHOLE_NAN else value

@@ -183,11 +183,16 @@ def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place
         return
     row, back = int(bad[0]) + 1, int(np.sum(steps < 0.0))
     advice = "remove the row, or import the file with a sample rate"
+    falls, usual = steps[steps < 0.0], float(np.median(np.abs(steps)))
+    again = back > 1 and np.ptp(falls) < GAP_STEPS * usual and -falls.max() > GAP_STEPS * usual
     if time_s.min() == time_s.max():
         problem = f"the stamps are all {time_s[0]:g} s"
         advice = "say the rate of the rows: hil import FILE --rate HZ"
     elif not steps[row - 1]:
         problem = "repeats (a duplicate row, or stamps with too few digits)"
+    elif again:
+        problem = f"runs back by {-np.median(falls):.6g} s in {back} places"
+        advice = "if it is a counter that starts again, write its range into a map: time.wraps_at"
     elif back > max(3, time_s.size // 100):
         problem, advice = f"runs back in {back} places, the rows are out of order", "sort the file by its time"
     else:

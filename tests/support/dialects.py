@@ -1,7 +1,8 @@
 """One known rotary axis as the programs of drives, controllers and loggers export it, each by a writer of its own.
 
 The forms follow public descriptions and exports: the manual of TwinCAT Scope, LinuxCNC's halscope(1) and halsampler(1),
-`camonitor` of EPICS, `rostopic echo -p`, PlotJuggler, SINUMERIK Trace sessions, the telemetry of ODrive and moteus.
+`camonitor` and the archiver appliance of EPICS, annotated CSV of InfluxDB, `rostopic echo -p`, PlotJuggler, SINUMERIK
+Trace sessions, the telemetry of ODrive and moteus.
 """
 
 from __future__ import annotations
@@ -273,6 +274,80 @@ def plotjuggler(path: Path) -> None:
     )
 
 
+def grafana(path: Path) -> None:
+    """Download of a panel with formatted values: each cell has the unit that suits its size."""
+
+    def formatted(value: float) -> str:
+        return f"{value:.5f} N·m" if abs(value) >= 1.0 else f"{1e3 * value:.2f} mN·m"
+
+    stamps = [f"2024-03-11 14:05:{k // 1000:02d}.{k % 1000:03d}" for k in range(T.size)]
+    rows = [f"{s},{d:.4f} °,{formatted(m)}" for s, d, m in zip(stamps, DEG, TORQUE, strict=True)]
+    _lines(path, ["sep=,", '"Time","angle","torque"', *rows], "\r\n")
+
+
+def sinumerik_xml_on_change(path: Path) -> None:
+    """Records without the values that are those of the record before; units beside the names."""
+    lines = ['<?xml version="1.0"?>', '<traceSession version="2.0"><traceData dataFrames="1"><dataFrame id="1">']
+    lines += ['<dataSignal id="f1" name="actPos" description="Actual position" units="deg"/>']
+    lines += ['<dataSignal id="f2" name="actTorque" description="Actual torque" units="Nm"/>']
+    texts = [[f"{a:.1f}" for a in DEG], [f"{round(m / 0.005) * 0.005:.3f}" for m in TORQUE]]
+    for k, t in enumerate(T):
+        given = [f' f{i + 1}="{one[k]}"' for i, one in enumerate(texts) if not k or one[k] != one[k - 1]]
+        lines.append(f'<rec time="{t:.3f}"{"".join(given)}/>')
+    _lines(path, [*lines, "</dataFrame></traceData></traceSession>"])
+
+
+def archiver(path: Path) -> None:
+    """Retrieval of the EPICS archiver appliance: stamps for each channel."""
+
+    def points(values: np.ndarray, late_ns: int) -> list[dict[str, float]]:
+        return [
+            {"secs": 1_709_042_400 + k // 1000, "nanos": k % 1000 * 1_000_000 + late_ns, "val": v, "severity": 0}
+            for k, v in enumerate(values.tolist())
+        ]
+
+    channels = ("AX1:TrqAct", "mNm", 1e3 * TORQUE, 0), ("AX1:PosAct", "deg", DEG + np.rad2deg(SPEED) * 3e-4, 300_000)
+    content = [
+        {"meta": {"name": name, "EGU": unit, "PREC": "4"}, "data": points(values, late_ns)}
+        for name, unit, values, late_ns in channels
+    ]
+    path.write_text(json.dumps(content))
+
+
+def influx(path: Path) -> None:
+    """Annotated CSV: a table for each field, the unit as a tag."""
+    above = ["#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,dateTime:RFC3339Nano,double,string,string,string"]
+    above += ["#group,false,false,true,true,false,false,true,true,true", "#default,_result,,,,,,,,"]
+    above += [",result,table,_start,_stop,_time,_value,_field,axis,unit"]
+    rows = [
+        f",,{table},2025-01-16T07:30:00Z,2025-01-16T07:31:00Z,2025-01-16T07:30:{k // 1000:02d}.{k % 1000:03d}Z,"
+        f"{value:.6f},{name},M2,{unit}"
+        for table, (name, unit, values) in enumerate((("angle", "deg", DEG), ("torque", "Nm", TORQUE)))
+        for k, value in enumerate(values)
+    ]
+    _lines(path, above + rows, "\r\n")
+
+
+def sql_historian(path: Path) -> None:
+    """Rows of a query: tags in turn, with unit and quality; a value of bad quality."""
+    lines = ["TimeStamp;TagName;Value;EngUnit;Quality"]
+    for k, (degrees, torque) in enumerate(zip(DEG, TORQUE, strict=True)):
+        stamp = f"2023-11-05 06:10:{k // 1000:02d}.{k % 1000:03d}"
+        lines += [f"{stamp};M2.Angle;{degrees:.5f};deg;192", f"{stamp};M2.Torque;{torque:.5f};Nm;192"]
+        lines += [f"{stamp};M2.Status;READY;;192"] if k % 500 == 0 else []
+        lines += [f"{stamp};M2.Torque;99;Nm;0"] if k == 777 else []
+    _lines(path, lines)
+
+
+def arduino(path: Path) -> None:
+    """Serial monitor with the time of the PC before each line; micros() starts again at 2^32."""
+    lines = ["21:14:01.877 -> rig ready", "21:14:02.001 -> us,angle_rad,torque_Nm"]
+    for k, (angle, torque) in enumerate(zip(ANGLE, TORQUE, strict=True)):
+        host = f"21:14:{2 + k // 1000:02d}.{(k + k * 7 % 5) % 1000:03d}"
+        lines.append(f"{host} -> {(2**32 - 1_234_567 + 1000 * k) % 2**32},{angle:.6f},{torque:.6f}")
+    _lines(path, lines)
+
+
 DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "TwinCAT Scope, a clock per channel": ("csv", twincat_pairs),
     "TwinCAT Scope, one clock": ("csv", twincat_one_clock),
@@ -281,6 +356,7 @@ DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "TwinCAT Scope, local time": ("csv", twincat_local_time),
     "TwinCAT Scope, without a header": ("txt", twincat_bare),
     "SINUMERIK Trace, XML": ("xml", sinumerik_xml),
+    "SINUMERIK Trace, XML on change": ("xml", sinumerik_xml_on_change),
     "SINUMERIK Trace, CSV": ("csv", sinumerik_csv),
     "LinuxCNC halscope": ("csv", halscope),
     "LinuxCNC halsampler": ("log", halsampler),
@@ -291,6 +367,11 @@ DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "moteus, CSV": ("csv", moteus_csv),
     "EPICS camonitor": ("txt", camonitor),
     "EPICS camonitor, on change": ("log", camonitor_on_change),
+    "EPICS archiver appliance": ("json", archiver),
+    "InfluxDB, annotated CSV": ("csv", influx),
+    "SQL historian": ("csv", sql_historian),
+    "Grafana, formatted": ("csv", grafana),
+    "Arduino, micros()": ("txt", arduino),
     "MR Configurator2": ("csv", mr_configurator),
     "ROS, rostopic echo -p": ("csv", rostopic),
     "ROS, PlotJuggler": ("csv", plotjuggler),

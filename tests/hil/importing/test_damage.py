@@ -49,7 +49,11 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
     "a cut last row": ("csv", text(TEXT[:-12]), "given [123] fields|no number"),
     "half of a row in the middle": ("csv", with_lines((1500, LINES[1500][:9])), "1501|no number"),
     "text in the torque": ("csv", with_lines(field(700, 3, "error")), "no number"),
-    "a unit beside each torque": ("csv", text("\n".join([LINES[0], *(f"{line} Nm" for line in LINES[1:])])), "torque"),
+    "an unknown unit beside each torque": (
+        "csv",
+        text("\n".join([LINES[0], *(f"{line} Nq" for line in LINES[1:])])),
+        "torque",
+    ),
     "infinity in the torque": ("csv", table(**in_rows("torque", slice(50, 51), np.inf)), "no number"),
     "infinity as a word": ("csv", with_lines(field(700, 3, "inf")), "no number"),
     "stamps of text": (

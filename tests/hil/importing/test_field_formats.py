@@ -16,7 +16,7 @@ from hil.errors import InputError
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import map_text
-from hil.importing.variables import load_variables
+from hil.importing.records import read_records
 
 # the units of the columns are not in these: the map asks for them; with rad the result is in other units
 WITHOUT_UNITS = {
@@ -66,19 +66,19 @@ def test_the_document_lists_the_dialects_that_are_tested() -> None:
 
 
 def test_values_that_are_older_than_three_intervals_are_held(tmp_path: Path) -> None:
-    lines = [f"{k}.0;speed;{k}" for k in range(20)] + ["0.0;state;1", "10.0;state;2", "19.0;state;2"]
+    lines = [f"{k}.0 speed {k}" for k in range(20)] + ["0.0 state 1", "10.0 state 2", "19.0 state 2"]
     path = tmp_path / "long.txt"
     path.write_text("\n".join(lines))
-    arrays = load_variables(path).arrays
+    arrays = read_records(path).columns.lists
     np.testing.assert_array_equal(arrays["speed"], np.arange(20.0))
     np.testing.assert_array_equal(arrays["state"], [1.0] * 10 + [2.0] * 10)
 
 
 def test_values_that_are_printed_late_are_put_in_order(tmp_path: Path) -> None:
-    lines = [f"{k}.0;speed;{k}" for k in (*range(8), 9, 8, *range(10, 20))] + [f"{k}.0;force;{-k}" for k in range(20)]
+    lines = [f"{k}.0 speed {k}" for k in (*range(8), 9, 8, *range(10, 20))] + [f"{k}.0 force {-k}" for k in range(20)]
     path = tmp_path / "long.txt"
     path.write_text("\n".join(lines))
-    arrays = load_variables(path).arrays
+    arrays = read_records(path).columns.lists
     np.testing.assert_array_equal(arrays["time"], np.arange(20.0))
     np.testing.assert_array_equal(arrays["speed"], np.arange(20.0))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hil.errors import InputError
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import map_text
-from hil.importing.on_change import held, written_on_change
+from hil.importing.on_change import columns_on_change, held, written_on_change
 
 AXIS = axis()
 T = AXIS["t"]
@@ -51,6 +52,37 @@ def columns_at(values: np.ndarray) -> dict[str, np.ndarray]:
 
 def text_with_empty_cells(columns: dict[str, np.ndarray]) -> str:
     return csv_text(columns).replace("nan", "")
+
+
+def test_noise_with_few_digits_tells_a_value_that_holds() -> None:
+    random = np.random.default_rng(6)
+    noisy = np.round(AXIS["torque"] + random.normal(0.0, 0.05, T.size), 2)
+    assert written_on_change(on_change(noisy))
+    assert not written_on_change(np.where(random.random(T.size) < 0.3, np.nan, noisy))
+    rarely = np.where(random.random(T.size) < 0.01, np.nan, AXIS["speed"])
+    assert columns_on_change({"a": on_change(noisy), "b": AXIS["angle"], "c": rarely}) == ["a", "c"]
+    assert columns_on_change({"b": noisy, "c": rarely}) == []
+
+
+@pytest.mark.parametrize("form", ["attributes", "elements", "lines of JSON"])
+def test_records_without_the_values_that_stay_are_imported(tmp_path: Path, form: str) -> None:
+    texts = {"speed_rpm": AXIS["speed"] * 30.0 / np.pi, "torque_Nm": AXIS["torque"]}
+    columns = {name: on_change(np.round(values, 1 if "rpm" in name else 2)) for name, values in texts.items()}
+    records = [
+        {"t_ms": round(1e3 * t)} | {name: float(one[k]) for name, one in columns.items() if np.isfinite(one[k])}
+        for k, t in enumerate(T)
+    ]
+    write = {
+        "attributes": lambda one: f"<r {' '.join(f'{key}={str(value)!r}' for key, value in one.items())}/>",
+        "elements": lambda one: f"<r>{''.join(f'<{key}>{value}</{key}>' for key, value in one.items())}</r>",
+        "lines of JSON": json.dumps,
+    }[form]
+    lines = [write(one) for one in records]
+    path, map_path = tmp_path / ("log.jsonl" if "JSON" in form else "log.xml"), tmp_path / "map.yaml"
+    path.write_text("\n".join(lines if "JSON" in form else ['<log xmlns="urn:axis">', *lines, "</log>"]))
+    map_path.write_text(map_text(draft_map(path)))
+    recording = import_recording(path, map_path)
+    np.testing.assert_allclose(recording["torque_n_m"], np.round(AXIS["torque"], 2), atol=1e-9)
 
 
 def test_a_file_with_a_set_point_on_change_is_imported(tmp_path: Path) -> None:

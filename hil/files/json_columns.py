@@ -28,10 +28,11 @@ _STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec"))
 
 @dataclass(frozen=True)
 class JsonContent:
-    """Lists of values, scalars and units of a JSON file, by name."""
+    """Lists of values, scalars, texts and units of a JSON file, by name; scalars and texts by path: motor.kt."""
 
     lists: dict[str, list[Any]]
     scalars: dict[str, float]
+    texts: dict[str, str]
     units: dict[str, str]
 
     def numbers(self, path: Path, name: str) -> FloatArray:
@@ -52,14 +53,14 @@ def read_json(path: Path) -> JsonContent:
     check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
     with parsing(path, "JSON file"):
         data = _loaded(path, path.read_text(encoding="utf-8-sig"))
-    lists, scalars, units = dict[str, list[Any]](), dict[str, float](), dict[str, str]()
+    content = JsonContent({}, {}, {}, {})
     with parsing(path, "JSON file of numbers"):
-        _collect(path, data, lists, scalars, units)
-    if not lists:
+        _collect(path, data, content)
+    if not content.lists:
         raise InputError(
             f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
         )
-    return JsonContent(lists, scalars, units)
+    return content
 
 
 def _loaded(path: Path, text: str) -> Any:
@@ -109,9 +110,9 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _collect(
-    path: Path, data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]
-) -> None:
+def _collect(path: Path, data: Any, into: JsonContent, within: str = "") -> None:
+    """Put what `data` holds into `into`; `within` is the path to it, with a point at its end."""
+    lists, units = into.lists, into.units
     if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
         channels = [(_first(row, _NAME_KEYS, str), _first(row, _VALUE_KEYS, list), row.get("unit")) for row in data]
         if all(name is not None and values is not None for name, values, _ in channels):  # an object per channel
@@ -138,8 +139,10 @@ def _collect(
             if isinstance(value, list) and value and not isinstance(value[0], dict | list):
                 lists[name] = value
             elif isinstance(value, int | float) and not isinstance(value, bool):
-                scalars[name] = float(value)
-            elif isinstance(value, dict) and value and all(isinstance(unit, str) for unit in value.values()):
-                units.update(value)
+                into.scalars[f"{within}{name}"] = float(value)
+            elif isinstance(value, str):
+                into.texts[f"{within}{name}"] = value
             elif isinstance(value, dict | list):
-                _collect(path, value, lists, scalars, units)
+                if isinstance(value, dict) and all(isinstance(unit, str) for unit in value.values()):
+                    units.update(value)
+                _collect(path, value, into, f"{within}{name}.")

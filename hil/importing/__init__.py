@@ -7,7 +7,7 @@ file to variables    mat_size, mat_file, mdf_file, long_text, variables         
 file to table        row_groups, foreign_table (all columns)                     `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
-                     header_values
+                     header_values, stated
 clock                stamp_columns, clock; hil.recording.stamps and row_clock    `StampClock`, `RegularRows`
                      channel_clocks (stamps of each channel)                     `OwnClocks`
 values that hold     on_change                                                   columns without empty cells

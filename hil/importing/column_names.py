@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_text, whole_unit
+from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_part, unit_of_text, whole_unit
 from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
@@ -47,6 +47,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "") -> Label:
         unit, odd = unit_of_text(unit_text), unit_of_text(unit_text) is None
     if unit is None and not odd:
         unit = split_unit(words_beside)[1] if _BRACKET.search(words_beside) else None
+    if unit is None and (part := unit_of_part(words_beside)):
+        unit, odd = part, False
     tokens = plain_words(name)
     beside = _words(plain_words(words_beside))
     words = _words(tokens) + beside

@@ -108,7 +108,14 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         entry.keys[key] = header.value
         entry.notes.append(f"{column}: its constant is taken from the header of the file: {header.text}")
         return entry
-    named = [name for name in table.scalars if re.sub(r"[^a-z]", "", name.lower()) in lexicon().scalars.constant]
+    positive = [name for name, value in table.scalars.items() if 0.0 < value < np.inf]
+    names = {name: re.sub(r"[^a-z]", "", name.rpartition(".")[2].lower()) for name in positive}
+    sized = [told.text for told in constants.values()]  # those whose unit says what they are
+    named = [
+        name
+        for name, last in names.items()
+        if last in lexicon().scalars.constant and not any(text.startswith(f"{name}: ") for text in sized)
+    ]
     if len(named) == 1:
         value = table.scalars[named[0]]
         entry.notes.append(f"{column}: {named[0]} = {value:g} of the file is taken as {si} per {unit or 'unit'}")

@@ -67,7 +67,7 @@ def import_(
 
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
     """Draft a map beside the recording to write; return its path. Raises InputError: the user must complete it."""
-    from hil.errors import InputError
+    from hil.errors import InputError, listed
     from hil.files.input_file import is_file
     from hil.files.output import write_text
     from hil.importing.draft_map import draft_map
@@ -84,6 +84,8 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
         err.print("Please check in the map:")
         for note in draft.unsure:
             err.print(f"  - {note}", markup=False)
+    if draft.left_out:
+        err.print(f"Not used, with reasons at the end of the map: {listed(draft.left_out)}", markup=False)
     if draft.asked:
         questions = [f"{path}:{line}: {question}" for line, question in asked_lines(text)]
         told = (

@@ -13,7 +13,7 @@ clock                stamp_columns, clock; hil.recording.stamps and row_clock   
 values that hold     on_change                                                   columns without empty cells
 rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`
 roles                relations, computed_position, effort_roles, one_axis,       `Roles`
-                     monitor_outputs, roles
+                     unnamed_columns, monitor_outputs, roles
 refusal              damage                                                      InputError, notes
 units and signs      unit_choice, usual_values, encoder_counts, position_units,  entries of the map
                      effort_entry, speed_unit, channel_entries

@@ -15,8 +15,8 @@ from hil.importing.lexicon import Constant
 from hil.importing.map_draft import Asked, DraftedChannel, MapDraft
 from hil.importing.map_file import ChannelSource
 from hil.importing.position_units import PositionUnits, effort_si
-from hil.importing.relations import derivative_of, driven, lateness_s, proportional
-from hil.importing.roles import SAME_POSITION, Roles
+from hil.importing.relations import SAME_POSITION, derivative_of, driven, lateness_s, proportional
+from hil.importing.roles import Roles
 from hil.importing.speed_unit import speed_entry
 from hil.importing.unit_choice import MATCH, is_length, misfit
 from hil.importing.usual_values import LEADS_M, mixed_up, usual_lead

@@ -1,6 +1,6 @@
 """Draft the map of a foreign file: its clock, its columns by role, and an entry for each channel."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from hil.errors import InputError
 from hil.files.input_file import bounded
 from hil.importing.channel_clocks import on_one_clock
 from hil.importing.channel_entries import ChannelEntries
-from hil.importing.clock import find_clock
+from hil.importing.clock import find_clock, time_columns
 from hil.importing.column_names import Label, label
 from hil.importing.damage import jump_notes, limit_notes, refuse_damage, refuse_missing
 from hil.importing.foreign_table import ForeignTable, read_table
@@ -35,7 +35,9 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
     """
     table = read_table(path)
-    own = on_one_clock(table, _labels(table))
+    given, labels = table.columns, _labels(table)
+    times = set(time_columns(table, labels))
+    own = on_one_clock(table, labels)
     table = own.table
     on_change = [name for name, values in table.columns.items() if written_on_change(values)]
     filled_up = {name: held(table.columns[name]) for name in on_change}
@@ -108,7 +110,21 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         entry |= {"time": own.times[column].model_dump(exclude_defaults=True)} if column in own.times else {}
         entry |= {"wraps_at": wraps[column] / table.scales.get(column, (1.0, 0.0))[0]} if column in wraps else {}
         entry |= {"empty": "hold"} if column in on_change else {}
+    _list_the_rest(draft, given, times)
     return draft
+
+
+def _list_the_rest(draft: MapDraft, given: Mapping[str, FloatArray], times: Collection[str]) -> None:
+    """List the columns `given` (n,), of which `times` are of time, that have no reason yet: each is used or listed."""
+    entries = [ChannelSource.model_validate(one.entry) for one in draft.channels]
+    stamps = [part for one in entries if one.time for part in (one.time, one.time.fraction) if part]
+    used = draft.clock.columns | {one.column for one in (*entries, *stamps)}
+    for name, values in given.items():
+        if name in used:
+            draft.left_out.pop(name, None)
+        elif name not in draft.left_out:
+            why = "another time" if name in times else "no channel takes it"
+            draft.left_out[name] = why if np.isfinite(values).any() else "has no finite number"
 
 
 def _labels(table: ForeignTable) -> dict[str, Label]:

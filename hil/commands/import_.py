@@ -35,7 +35,9 @@ def import_(
     ] = None,
     axis: Annotated[
         str | None,
-        typer.Option(help="Number of the axis in the column names, if the file holds several.", show_default=False),
+        typer.Option(
+            help="Number or letter of the axis in the names of columns, of a file with several.", show_default=False
+        ),
     ] = None,
 ) -> None:
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""

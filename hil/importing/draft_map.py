@@ -117,8 +117,10 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
 def _list_the_rest(draft: MapDraft, given: Mapping[str, FloatArray], times: Collection[str]) -> None:
     """List the columns `given` (n,), of which `times` are of time, that have no reason yet: each is used or listed."""
     entries = [ChannelSource.model_validate(one.entry) for one in draft.channels]
-    stamps = [part for one in entries if one.time for part in (one.time, one.time.fraction) if part]
-    used = draft.clock.columns | {one.column for one in (*entries, *stamps)}
+    stamps = [one.time for one in entries if one.time] + [
+        one.time.fraction for one in entries if one.time and one.time.fraction
+    ]
+    used = draft.clock.columns | {one.column for one in entries} | {one.column for one in stamps}
     for name, values in given.items():
         if name in used:
             draft.left_out.pop(name, None)

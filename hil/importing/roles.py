@@ -10,11 +10,11 @@ from hil.errors import InputError, listed
 from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one, unanswered_one
-from hil.importing.effort_roles import better_speed, choose_efforts
+from hil.importing.effort_roles import EXPLAINED, better_speed, choose_efforts
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.monitor_outputs import monitor_outputs
 from hil.importing.one_axis import one_axis
-from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, proportional
+from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, driven, proportional
 from hil.importing.unnamed_columns import quantities_by_relations
 
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
@@ -98,6 +98,7 @@ def find_roles(
         roles.effort, roles.effort_command = found.measured, found.command
         roles.left_out |= found.left_out
         roles.unsure += found.unsure
+        roles.unsure += _of_two_axes(live, labels, moved, period_s, roles)
     if roles.motor is None and roles.motor_velocity is None:
         told = f"; constant are {listed(frozen)}" if frozen else ""
         raise InputError(
@@ -105,6 +106,19 @@ def find_roles(
             "record it, or write its column into a map: hil import FILE --map MAP.yaml"
         )
     return roles
+
+
+def _of_two_axes(
+    live: dict[str, FloatArray], labels: dict[str, Label], moved: MeasuredMotion, period_s: float, roles: Roles
+) -> list[str]:
+    """Note on an effort that the motion hardly explains, and whose name tells another axis; empty without."""
+    moving, driving = roles.motor or roles.motor_velocity, roles.effort or roles.effort_command
+    if not moving or not driving or driven(live[driving], moved, period_s).share > EXPLAINED:
+        return []
+    one, other = labels[moving].number, labels[driving].number
+    if not one or not other or one == other:
+        return []
+    return [f"{driving}: by its name of axis {other}, {moving} of axis {one}; check that it drives this axis"]
 
 
 def _positions(
@@ -142,9 +156,15 @@ def _positions(
     far = [name for name in measured if labels[name].table]
     near = [name for name in measured if not labels[name].table] or far
     roles.motor = next((name for name in near if labels[name].motor), None) or min(
-        near, key=lambda name: (not labels[name].measured, int(labels[name].number or 0), near.index(name))
+        near, key=lambda name: (not labels[name].measured, labels[name].number.zfill(9), near.index(name))
     )
     rest = [name for name in (*far, *near) if name != roles.motor]
+    for name in [one for one in rest if not labels[one].table]:
+        share = proportional(live[name], live[roles.motor]).share
+        if share < FOLLOWED:
+            rest.remove(name)
+            roles.left_out[name] = f"a position that does not follow {roles.motor} (share {share:.2f})"
+            roles.unsure.append(f"{name}: does not follow {roles.motor} (share {share:.2f}): of another axis, not used")
     if rest:
         roles.table = rest[0]
         if not labels[rest[0]].table:

@@ -1,5 +1,6 @@
 """hil import."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -90,8 +91,8 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
         err.print(f"Not used, with reasons at the end of the map: {listed(draft.left_out)}", markup=False)
     if draft.asked:
         questions = [f"{path}:{line}: {question}" for line, question in asked_lines(text)]
-        told = (
-            f"{source}: the file does not tell what follows; write it into the map, then hil import FILE --map {path}"
-        )
+        to = [] if target == Path(f"{source.stem}.parquet") else ["--out", str(target)]
+        command = shlex.join(["hil", "import", str(source), "--map", str(path), *to])
+        told = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
         raise InputError("\n".join([told, *questions]))
     return path

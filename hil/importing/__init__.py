@@ -17,7 +17,8 @@ roles                relations, computed_position, effort_roles, one_axis,      
 refusal              damage                                                      InputError, notes
 units and signs      unit_choice, usual_values, encoder_counts, position_units,  entries of the map
                      effort_entry, speed_unit, channel_entries
-map                  map_file (its keys), map_draft, draft_map, map_text         `MapDraft`, the YAML file
+map                  map_file (its keys), questions, map_draft, draft_map,       `MapDraft`, the YAML file
+                     map_text
 recording            by_map                                                      `Recording`
 
 A drafted map is applied like any other: `by_map` knows nothing of how it came about.

@@ -12,6 +12,7 @@ from hil.identification.least_squares import LinearFit
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Constant, lexicon
+from hil.importing.questions import effort_unit
 from hil.importing.relations import proportional
 from hil.importing.unit_choice import is_joint_state
 from hil.quantities import UNITS
@@ -23,10 +24,6 @@ _OR_SCREW = (
     "; or of a motor with a screw rename motor_position_m to motor_position_rad and force_n to torque_n_m, and write "
     "torque_constant_n_m_a here and lead_m above"
 )
-_UNIT_QUESTION = {
-    AxisKind.ROTARY: "its unit is not in the file; write N m, mN m; or A and torque_constant_n_m_a, % and rated (N m)",
-    AxisKind.LINEAR: "its unit is not in the file; write N; or A and force_constant_n_a, % and rated (N)",
-}
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
 
 
@@ -126,7 +123,7 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         return entry
     if unit is None:
         if not is_joint_state(told):
-            entry.asked["unit"] = _UNIT_QUESTION[kind]
+            entry.asked["unit"] = effort_unit(kind)
         return entry
     entry.keys[key if unit == "A" else "gain"] = 1.0
     if told.electric == "V":  # of the motor, which a bench in volts drives, and no output that stands for a torque

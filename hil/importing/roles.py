@@ -99,13 +99,20 @@ def find_roles(
         roles.left_out |= found.left_out
         roles.unsure += found.unsure
         roles.unsure += _of_two_axes(live, labels, moved, period_s, roles)
-    if roles.motor is None and roles.motor_velocity is None:
+    if roles.motor is None and roles.motor_velocity is None and len(may_be_asked(columns, labels)) < 2:
         told = f"; constant are {listed(frozen)}" if frozen else ""
         raise InputError(
-            f"{where}: no column is the measured position of the axis (columns: {listed(columns)}{told}); "
-            "record it, or write its column into a map: hil import FILE --map MAP.yaml"
+            f"{where}: no column is the measured position of the axis (columns: {listed(columns)}{told}); record "
+            "it with the torque"
         )
     return roles
+
+
+def may_be_asked(columns: dict[str, FloatArray], labels: dict[str, Label], used: Collection[str] = ()) -> list[str]:
+    """Columns (n,) that move, are not `used`, and whose names do not say that they are no channel."""
+    none = (Quantity.OTHER, Quantity.ACCELERATION, Quantity.TIME)
+    open_ones = [name for name in columns if name in labels and name not in used and labels[name].quantity not in none]
+    return [name for name in open_ones if np.ptp(columns[name]) > 0.0]
 
 
 def _of_two_axes(

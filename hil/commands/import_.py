@@ -1,5 +1,6 @@
 """hil import."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -35,7 +36,9 @@ def import_(
     ] = None,
     axis: Annotated[
         str | None,
-        typer.Option(help="Number of the axis in the column names, if the file holds several.", show_default=False),
+        typer.Option(
+            help="Number or letter of the axis in the names of columns, of a file with several.", show_default=False
+        ),
     ] = None,
 ) -> None:
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
@@ -67,7 +70,7 @@ def import_(
 
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
     """Draft a map beside the recording to write; return its path. Raises InputError: the user must complete it."""
-    from hil.errors import InputError
+    from hil.errors import InputError, listed
     from hil.files.input_file import is_file
     from hil.files.output import write_text
     from hil.importing.draft_map import draft_map
@@ -84,10 +87,12 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
         err.print("Please check in the map:")
         for note in draft.unsure:
             err.print(f"  - {note}", markup=False)
+    if draft.left_out:
+        err.print(f"Not used, with reasons at the end of the map: {listed(draft.left_out)}", markup=False)
     if draft.asked:
         questions = [f"{path}:{line}: {question}" for line, question in asked_lines(text)]
-        told = (
-            f"{source}: the file does not tell what follows; write it into the map, then hil import FILE --map {path}"
-        )
+        to = [] if target == Path(f"{source.stem}.parquet") else ["--out", str(target)]
+        command = shlex.join(["hil", "import", str(source), "--map", str(path), *to])
+        told = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
         raise InputError("\n".join([told, *questions]))
     return path

@@ -8,6 +8,7 @@ from hil.drafting.sensor_values import noise_of, torque_delay_s
 from hil.errors import InputError
 from hil.identification.friction import identify_friction
 from hil.identification.law.result import sure
+from hil.importing.by_map import ONE
 from hil.quantities import digits
 from hil.recording.recording import Recording
 
@@ -30,6 +31,7 @@ def bench_notes(
     effort, noise_unit = ("force", "N") if linear else ("voltage", unit) if unit else ("torque", "N m")
     if names.torque in recording.columns:
         _of_torque(recording, plant, effort, noise_unit, notes, unsure)
+        unsure += [] if unit else _of_constant(recording)
     else:
         unsure.append(
             "masses and friction are assumed: no torque is recorded; two encoders tell the transmission, and of masses "
@@ -52,6 +54,18 @@ def bench_notes(
         f"{feeds.offset:.3g} +-{feeds.offset_std_error:.2g}"
     )
     return notes, unsure
+
+
+def _of_constant(recording: Recording) -> list[str]:
+    """Reminder of a torque constant that the map gives as 1, which may stand for an unknown one; empty without."""
+    names, origins = recording.axis, recording.metadata.get("channels", {})
+    ones = [origins[name][ONE] for name in (names.torque, names.torque_command) if ONE in origins.get(name, {})]
+    what = "mass, friction" if recording.kind is AxisKind.LINEAR else "inertia, friction"
+    return [
+        f"the map gives {one}: 1; if that stands for an unknown value, {what}, loads and torque gains are not in SI: "
+        f"multiply them by the true {one}"
+        for one in ones[:1]
+    ]
 
 
 def _of_transmission(

@@ -10,6 +10,7 @@ from hil.channels import AxisKind
 from hil.drafting.assumed_plant import plant_or_assumed
 from hil.drafting.bench_notes import bench_notes
 from hil.drafting.bench_value import BenchValue
+from hil.drafting.identifiable import refuse_untold
 from hil.drafting.loop_values import loop_values
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.ratio_values import gear_of, lead_of
@@ -55,7 +56,8 @@ def draft_bench(*recordings: Recording) -> BenchDraft:
     Masses and friction are those of all parts together, of which one tells what another does not; ratio, control law
     and encoders are those of the longest part that moves.
     Raises InputError if masses and friction cannot be told: neither torque nor a second encoder, no part that slides, a
-    wrong sign; and for recordings of different kinds or channels.
+    wrong sign, errors above all values without another one that is told; and for recordings of different kinds or
+    channels.
     """
     parts = [part for recording in recordings for part in with_position(recording).parts()]
     first = parts[0]
@@ -110,6 +112,8 @@ def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
         else:
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
+    if transmission is None and not draft.control:
+        refuse_untold(draft.name, draft.kind, plant)
     _encoders(draft, recording)
     _loads(draft, plant)
     notes, unsure = bench_notes(recordings, plant, transmission, "V" if volts else None, turns)

@@ -13,7 +13,7 @@
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +29,12 @@ MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 7
 
 @dataclass(frozen=True)
 class RecordColumns:
-    """Lists of values, scalars and units of a file of records, by name."""
+    """Lists of values, scalars, units and texts of a file of records, by name; scalars and texts by path: motor.kt."""
 
     lists: dict[str, list[Any]]
     scalars: dict[str, float]
     units: dict[str, str]
+    texts: dict[str, str] = field(default_factory=dict)
 
     def numbers(self, path: Path, name: str) -> FloatArray:
         """The list `name` as numbers (n,), null as NaN. Raises InputError: no such list, or no numbers."""
@@ -53,14 +54,14 @@ def read_json(path: Path) -> RecordColumns:
     check_file(path, "a JSON file up to this size, or the recording as CSV or Parquet", MOST_JSON_BYTES)
     with parsing(path, "JSON file"):
         data = _loaded(path, path.read_text(encoding="utf-8-sig"))
-    lists, scalars, units = dict[str, list[Any]](), dict[str, float](), dict[str, str]()
+    content = RecordColumns({}, {}, {})
     with parsing(path, "JSON file of numbers"):
-        _collect(path, data, lists, scalars, units)
-    if not lists:
+        _collect(path, data, content)
+    if not content.lists:
         raise InputError(
             f"{path}: holds no list of numbers, allowed lists by name or a record per row; export the channels as lists"
         )
-    return RecordColumns(lists, scalars, units)
+    return content
 
 
 def _loaded(path: Path, text: str) -> Any:
@@ -105,9 +106,9 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _collect(
-    path: Path, data: Any, lists: dict[str, list[Any]], scalars: dict[str, float], units: dict[str, str]
-) -> None:
+def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> None:
+    """Put what `data` holds into `into`; `within` is the path to it, with a point at its end."""
+    lists, units = into.lists, into.units
     if (points := rows_of_points(data)) is not None:
         lists.update(points)
     elif isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
@@ -136,8 +137,10 @@ def _collect(
             if isinstance(value, list) and value and not isinstance(value[0], dict | list):
                 lists[name] = value
             elif isinstance(value, int | float) and not isinstance(value, bool):
-                scalars[name] = float(value)
-            elif isinstance(value, dict) and value and all(isinstance(unit, str) for unit in value.values()):
-                units.update(value)
+                into.scalars[f"{within}{name}"] = float(value)
+            elif isinstance(value, str):
+                into.texts[f"{within}{name}"] = value
             elif isinstance(value, dict | list):
-                _collect(path, value, lists, scalars, units)
+                if isinstance(value, dict) and all(isinstance(unit, str) for unit in value.values()):
+                    units.update(value)
+                _collect(path, value, into, f"{within}{name}.")

@@ -9,17 +9,18 @@ file to records      long_text, records; hil.files.json_columns, xml_records    
 file to table        row_groups, foreign_table (all columns)                     `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
-                     header_values
+                     header_values, stated
 clock                stamp_columns, clock; hil.recording.stamps and row_clock    `StampClock`, `RegularRows`
                      channel_clocks (stamps of each channel)                     `OwnClocks`
 values that hold     on_change                                                   columns without empty cells
 rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`
 roles                relations, computed_position, effort_roles, one_axis,       `Roles`
-                     monitor_outputs, roles
+                     unnamed_columns, monitor_outputs, roles
 refusal              damage                                                      InputError, notes
 units and signs      unit_choice, usual_values, encoder_counts, position_units,  entries of the map
                      effort_entry, speed_unit, channel_entries
-map                  map_file (its keys), map_draft, draft_map, map_text         `MapDraft`, the YAML file
+map                  map_file (its keys), questions, map_draft, draft_map,       `MapDraft`, the YAML file
+                     map_text
 recording            by_map                                                      `Recording`
 
 A drafted map is applied like any other: `by_map` knows nothing of how it came about.

@@ -23,6 +23,7 @@ from hil.recording.stamps import RegularRows, regular_rows
 
 EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
 STEP = "step"  # key of a channel's metadata: step of its values before they are interpolated
+ONE = "constant_of_one"  # key of a channel's metadata: constant of its effort that is 1 in the map, perhaps unknown
 MAPS = Path(__file__).parents[1] / "maps"
 
 
@@ -70,6 +71,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         step = count_of(raw[name][np.isfinite(raw[name])])
         if step is not None:
             origins[name][STEP] = step
+        if entry.constant_of_one:
+            origins[name][ONE] = entry.constant_of_one
         if entry.gain is not None:
             origins[name]["si_per_volt"] = gain if isinstance(entry.gain, str) else entry.gain
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"

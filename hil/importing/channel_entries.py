@@ -11,19 +11,19 @@ from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.effort_entry import effort_entry, signs_of
 from hil.importing.encoder_counts import CountSize, assumed, from_length, from_speed, scale_count
-from hil.importing.lexicon import Constant
-from hil.importing.map_draft import Asked, DraftedChannel, MapDraft
+from hil.importing.lexicon import Constant, Quantity
+from hil.importing.map_draft import Asked, DraftedChannel, MapDraft, ask_column
 from hil.importing.map_file import ChannelSource
 from hil.importing.position_units import PositionUnits, effort_si
-from hil.importing.relations import derivative_of, driven, lateness_s, proportional
-from hil.importing.roles import SAME_POSITION, Roles
+from hil.importing.questions import effort_unit, position_unit, speed_unit
+from hil.importing.relations import SAME_POSITION, derivative_of, driven, lateness_s, proportional
+from hil.importing.roles import Roles, may_be_asked
 from hil.importing.speed_unit import speed_entry
 from hil.importing.unit_choice import MATCH, is_length, misfit
 from hil.importing.usual_values import LEADS_M, mixed_up, usual_lead
 from hil.quantities import ROTARY_LEAD_M, UNITS
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
-_SCREW = "and in lead_m the metres per revolution of the motor, such as 0.010"
 LATE_ROWS = 0.5  # by which a set-point may seem late: its rounding and the sampling of the encoder
 
 
@@ -43,22 +43,41 @@ class ChannelEntries:
         self.unsized: dict[str, str] = {}  # keys of the size of its count that are asked
 
     def fill(self) -> None:
-        """Add the entries. Raises InputError: no column goes with the motion, or two units contradict each other."""
+        """Add the entries. Raises InputError: no column can go with the motion, or two units contradict each other."""
         roles = self.roles
-        if not (roles.effort or roles.effort_command or roles.table):
-            motion_of = f"position {roles.motor}" if roles.motor else f"speed {roles.motor_velocity}"
-            told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
-            raise InputError(
-                f"{self.draft.table.path}: {told}beside the {motion_of} no torque, force, current, voltage "
-                "or second encoder is found; record one, or write its column into a map: hil import FILE --map MAP.yaml"
-            )
         if roles.motor is None:
             self._velocity_only()
+        else:
+            self.positions.choose()
+            self._positions(roles.motor)
+            self._velocity_command()
+            self._efforts(self.positions.motion(roles.motor))
+        if not (roles.effort or roles.effort_command or roles.table):
+            self._ask_effort()
+
+    def _ask_effort(self) -> None:
+        """Ask for the column of the torque. Raises InputError: none can be it."""
+        roles, names = self.roles, AXIS_CHANNELS[self.kind]
+        said = {name for name, one in self.labels.items() if one.sure and not one.letter}
+        known = [name for name in said if self.labels[name].quantity is not Quantity.EFFORT]
+        left = may_be_asked(self.live, self.labels, [*roles.used, *known])
+        if left:
+            what = "the torque, force, current or voltage"
+            ask_column(self.draft, names.torque, what, effort_unit(self.kind), left)
             return
-        self.positions.choose()
-        self._positions(roles.motor)
-        self._velocity_command()
-        self._efforts(self.positions.motion(roles.motor))
+        motion_of = f"position {roles.motor}" if roles.motor else f"speed {roles.motor_velocity}"
+        told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
+        raise InputError(
+            f"{self.draft.table.path}: {told}beside the {motion_of} no torque, force, current, voltage or second "
+            "encoder is found; record one"
+        )
+
+    def _unit_question(self, name: str) -> str:
+        names, roles = AXIS_CHANNELS[self.kind], self.roles
+        channels = [names.motor_position]
+        channels += [names.torque] if roles.effort else []
+        channels += [names.torque_command] if roles.effort_command else []
+        return position_unit(self.kind, channels, name in roles.how)
 
     def _add(self, channel: str, column: str, what: str, keys: dict[str, object]) -> None:
         how = f"{what}; {self.roles.how[column]}" if column in self.roles.how else what
@@ -95,7 +114,7 @@ class ChannelEntries:
         for key, what in size.asked.items() if counted else {}:
             draft.asked.append(Asked(channel, key, f"{name}: {what}"))
         if name in self.asked:
-            draft.asked.append(Asked(channel, "unit", f"{name}: {_unit_question(self.kind)}"))
+            draft.asked.append(Asked(channel, "unit", f"{name}: {self._unit_question(name)}"))
         elif self.kind is AxisKind.ROTARY:
             if is_length(motor):
                 self._lead(name, counted)
@@ -144,7 +163,7 @@ class ChannelEntries:
         keys: dict[str, object] = {"unit": unit}
         unknown = bool({name, encoder} & self.asked)
         if name in self.asked:
-            self.draft.asked.append(Asked(channel, "unit", f"{name}: {_unit_question(self.kind)}"))
+            self.draft.asked.append(Asked(channel, "unit", f"{name}: {self._unit_question(name)}"))
         if share < 0.5:
             unsure.append(f"{name}: does not follow {encoder} (share {share:.2f}); check that it is {what}")
         elif factor < 0.0:
@@ -246,7 +265,7 @@ class ChannelEntries:
         given, unit = unit, None if volts else unit
         keys: dict[str, object] = {"unit": unit or "rad/s"} | ({"scale": 1.0} if volts else {})
         length = is_length(unit or "") or (unit is None and self.effort_si == "N")
-        asked = {} if unit else {"unit": _speed_question(length)}
+        asked = {} if unit else {"unit": speed_unit(length)}
         asked |= {"scale": f"is in {given}; write how many of this unit are 1 {given}"} if volts else {}
         if unit == "counts/s":
             size = self._count_size(name, None, 0.0)
@@ -259,15 +278,3 @@ class ChannelEntries:
         self.draft.asked += [Asked(channel, key, f"{name}: {what}") for key, what in asked.items()]
         self._add(channel, name, "no position is recorded", keys)
         self._efforts(motion(np.cumsum(self.live[name]) * self.period_s, self.period_s))
-
-
-def _unit_question(kind: AxisKind) -> str:
-    if kind is AxisKind.LINEAR:
-        return (
-            "its unit is not in the file; write m, mm, um or in (of a motor that turns, rename its channels: see above)"
-        )
-    return f"its unit is not in the file; write rad, deg, rev or counts; or a length such as mm, {_SCREW}"
-
-
-def _speed_question(length: bool) -> str:
-    return f"its unit is not in the file; write {'m/s, mm/s or m/min' if length else 'rad/s, deg/s, rpm or rev/s'}"

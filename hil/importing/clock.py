@@ -185,7 +185,7 @@ def _plausible(rate_hz: float) -> bool:
 
 def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
     for name, value in table.scalars.items():
-        plain = name.lower()
+        plain = name.rpartition(".")[2].lower()
         if plain in lexicon().scalars.rate and _plausible(value):
             return value, f"scalar {name} of the file"
         if plain in lexicon().scalars.period and _plausible(1.0 / (value or 1e9)):

@@ -5,12 +5,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_text, whole_unit
+from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_part, unit_of_text, whole_unit
 from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
 _BRACKET = re.compile(r"[\[({].*[\])}]")
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+(:\d+)?")
+_INDEX = re.compile(r"[\[({]\s*(?:\w+\s*[,;:]\s*)?(\d+)\s*[\])}]\s*$")  # [2], (2), [u1, 2]
+_LINEAR_AXES, _AXES = "xyz", "xyzabcuvw"  # ISO 841
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
 
 
@@ -24,7 +26,7 @@ class Label:
     measured: bool
     motor: bool
     table: bool
-    number: str  # of the axis or encoder, "" without one
+    number: str  # of the axis or encoder, or its letter; "" without one
     unit: str | None
     odd_unit: bool = False
     electric: str | None = None  # A or V if the word says current or voltage
@@ -50,10 +52,13 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         unit, odd = unit_of_text(unit_text), unit_of_text(unit_text) is None
     if unit is None and not odd:
         unit = split_unit(words_beside)[1] if _BRACKET.search(words_beside) else None
+    if unit is None and (part := unit_of_part(words_beside)):
+        unit, odd = part, False
     tokens = plain_words(name)
     beside = _words(plain_words(words_beside))
     words = _words(tokens) + beside
-    number = next((match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token))), "")
+    index = _INDEX.search(name if unit else column.strip())
+    odd = odd and index is None
     # of a path the last words count: pid.x.output, /joint_states/joint1/position
     parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]
     found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
@@ -76,7 +81,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _any(words, known.measured),
         _any(words, known.motor),
         _any(words, known.table),
-        number,
+        index[1] if index else _axis(tokens),
         unit,
         odd,
         _electric(words) if quantity is Quantity.EFFORT and not _any(words, known.torque) else None,
@@ -84,6 +89,13 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
     )
+
+
+def _axis(tokens: list[str]) -> str:
+    """Number at the end of a word, else the letter of an axis that is a word: pos2, act_torque_y; "" without one."""
+    numbers = (match[1] for token in reversed(tokens) if (match := re.search(r"(\d+)$", token)))
+    letters = (token for token in tokens if len(token) == 1 and token in (_AXES if len(tokens) > 1 else _LINEAR_AXES))
+    return next(numbers, next(letters, ""))
 
 
 def _electric(words: list[str]) -> str | None:

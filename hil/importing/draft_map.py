@@ -1,27 +1,28 @@
 """Draft the map of a foreign file: its clock, its columns by role, and an entry for each channel."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.channels import CHANNELS
+from hil.channels import AXIS_CHANNELS, CHANNELS, AxisKind
 from hil.errors import InputError
 from hil.files.input_file import bounded
 from hil.importing.channel_clocks import on_one_clock
 from hil.importing.channel_entries import ChannelEntries
-from hil.importing.clock import find_clock
+from hil.importing.clock import StampClock, find_clock, time_columns
 from hil.importing.column_names import Label, label
 from hil.importing.damage import jump_notes, limit_notes, refuse_damage, refuse_missing
 from hil.importing.foreign_table import ForeignTable, read_table
 from hil.importing.held_samples import rows_per_slowest_sample
 from hil.importing.lexicon import Quantity
-from hil.importing.map_draft import DraftedChannel, MapDraft
+from hil.importing.map_draft import DraftedChannel, MapDraft, ask_column
 from hil.importing.map_file import ChannelSource
 from hil.importing.on_change import columns_on_change, held
-from hil.importing.roles import find_roles
+from hil.importing.questions import effort_unit, position_unit
+from hil.importing.roles import Roles, find_roles, may_be_asked
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.wraps import unwrapped, wrap_range
@@ -32,10 +33,12 @@ from hil.importing.wraps import unwrapped, wrap_range
 def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
     """Draft the map of `path`; `rate_hz` and `axis` are what the user says beside the file.
 
-    Raises InputError: a damaged file, no clock, no motion, no column that goes with it, contradicting columns.
+    Raises InputError: a damaged file, no clock, no column that moves, contradicting columns.
     """
     table = read_table(path)
-    own = on_one_clock(table, _labels(table))
+    given, labels = table.columns, _labels(table)
+    times = set(time_columns(table, labels))
+    own = on_one_clock(table, labels)
     table = own.table
     on_change = columns_on_change(table.columns)
     filled_up = {name: held(table.columns[name]) for name in on_change}
@@ -54,6 +57,11 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
     dense = with_gaps_filled(dense)[0] if moving_little(dense, named) else dense
     regular = at_regular_times(path, {name: dense[name] for name in filled}, dense["time_s"])
     roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis, table.constants)
+    if roles.motor is None and roles.motor_velocity is None:
+        may_be = may_be_asked(regular.longest_part(), labels)
+        draft = _without_motion(table, clock, roles, may_be, [*table.notes, *own.notes, *clock.unsure])
+        _list_the_rest(draft, given, times)
+        return draft
     _refuse_same_name(table, roles.used)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(table, used)
@@ -113,7 +121,35 @@ def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None)
         entry |= {"time": own.times[column].model_dump(exclude_defaults=True)} if column in own.times else {}
         entry |= {"wraps_at": wraps[column] / table.scales.get(column, (1.0, 0.0))[0]} if column in wraps else {}
         entry |= {"empty": "hold"} if column in on_change else {}
+    _list_the_rest(draft, given, times)
     return draft
+
+
+def _without_motion(
+    table: ForeignTable, clock: StampClock, roles: Roles, may_be: Sequence[str], unsure: list[str]
+) -> MapDraft:
+    """A map that asks which of the columns `may_be` are motion and torque, where none is known to be the motion."""
+    left_out = roles.left_out | dict.fromkeys(may_be, "it may be one that is asked for above")
+    draft, kind = MapDraft(table, clock, left_out=left_out, unsure=unsure), AxisKind.ROTARY
+    names, motion = AXIS_CHANNELS[kind], "the measured position or velocity of the motor"
+    ask_column(draft, names.motor_position, motion, position_unit(kind, (), False), may_be)
+    ask_column(draft, names.torque, "the torque, force, current or voltage", effort_unit(kind), may_be)
+    return draft
+
+
+def _list_the_rest(draft: MapDraft, given: Mapping[str, FloatArray], times: Collection[str]) -> None:
+    """List the columns `given` (n,), of which `times` are of time, that have no reason yet: each is used or listed."""
+    entries = [ChannelSource.model_validate(one.entry) for one in draft.channels]
+    stamps = [one.time for one in entries if one.time] + [
+        one.time.fraction for one in entries if one.time and one.time.fraction
+    ]
+    used = draft.clock.columns | {one.column for one in entries} | {one.column for one in stamps}
+    for name, values in given.items():
+        if name in used:
+            draft.left_out.pop(name, None)
+        elif name not in draft.left_out:
+            why = "another time" if name in times else "no channel takes it"
+            draft.left_out[name] = why if np.isfinite(values).any() else "has no finite number"
 
 
 def _labels(table: ForeignTable) -> dict[str, Label]:

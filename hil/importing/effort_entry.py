@@ -12,6 +12,7 @@ from hil.identification.least_squares import LinearFit
 from hil.importing.column_names import Label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Constant, lexicon
+from hil.importing.questions import effort_unit
 from hil.importing.relations import proportional
 from hil.importing.unit_choice import is_joint_state
 from hil.quantities import UNITS
@@ -23,10 +24,6 @@ _OR_SCREW = (
     "; or of a motor with a screw rename motor_position_m to motor_position_rad and force_n to torque_n_m, and write "
     "torque_constant_n_m_a here and lead_m above"
 )
-_UNIT_QUESTION = {
-    AxisKind.ROTARY: "its unit is not in the file; write N m, mN m; or A and torque_constant_n_m_a, % and rated (N m)",
-    AxisKind.LINEAR: "its unit is not in the file; write N; or A and force_constant_n_a, % and rated (N)",
-}
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
 
 
@@ -108,7 +105,14 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         entry.keys[key] = header.value
         entry.notes.append(f"{column}: its constant is taken from the header of the file: {header.text}")
         return entry
-    named = [name for name in table.scalars if re.sub(r"[^a-z]", "", name.lower()) in lexicon().scalars.constant]
+    positive = [name for name, value in table.scalars.items() if 0.0 < value < np.inf]
+    names = {name: re.sub(r"[^a-z]", "", name.rpartition(".")[2].lower()) for name in positive}
+    sized = [told.text for told in constants.values()]  # those whose unit says what they are
+    named = [
+        name
+        for name, last in names.items()
+        if last in lexicon().scalars.constant and not any(text.startswith(f"{name}: ") for text in sized)
+    ]
     if len(named) == 1:
         value = table.scalars[named[0]]
         entry.notes.append(f"{column}: {named[0]} = {value:g} of the file is taken as {si} per {unit or 'unit'}")
@@ -119,7 +123,7 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         return entry
     if unit is None:
         if not is_joint_state(told):
-            entry.asked["unit"] = _UNIT_QUESTION[kind]
+            entry.asked["unit"] = effort_unit(kind)
         return entry
     entry.keys[key if unit == "A" else "gain"] = 1.0
     if told.electric == "V":  # of the motor, which a bench in volts drives, and no output that stands for a torque

@@ -15,6 +15,7 @@ from hil.quantities import UNITS
 NOTHING = 0.02  # share of a column that the motion explains, below which it is no torque of this axis
 EXPLAINED = 0.4  # share of a torque that one mass with friction explains: gravity and springs may be more
 _DERIVED = 0.5  # share of a velocity that is the derivative of its position: less is another motion
+_FOLLOWING = 0.9  # share of a position that is a multiple of a velocity: none that moves with it is
 _WEAK = 0.5  # of the share of the best column: a column of less is another axis, or a part of the torque
 
 
@@ -81,23 +82,31 @@ def choose_efforts(
 
 def better_speed(
     speeds: dict[str, FloatArray], efforts: list[FloatArray], moved: MeasuredMotion, period_s: float
-) -> str | None:
-    """A measured velocity (n,), no derivative of the position, that explains the torque where the position does not.
+) -> tuple[str, str] | None:
+    """A measured velocity (n,) that tells the motion, with why the position, whose derivative it is not, does not.
 
-    None without one, and where position and velocity are interchanged.
+    A position that grows with the velocity itself is the following error of a loop without feed-forward. None without
+    such a velocity, and where position and velocity are interchanged.
     """
     shares = [derivative_of(values, moved, period_s).share for values in speeds.values()]
-    if not efforts or not speeds or max(shares) >= _DERIVED:
+    if not speeds or max(shares) >= _DERIVED:
         return None
+    for name, values in speeds.items():
+        if proportional(moved.position, values).share > _FOLLOWING:
+            return name, f"it grows with {name} itself, as a following error does"
 
     def explained(one: MeasuredMotion) -> float:
         return max(driven(effort, one, period_s).share for effort in efforts)
 
+    if not efforts:
+        return None
     by_speed = {name: motion(np.cumsum(values) * period_s, period_s) for name, values in speeds.items()}
     answered = {name: explained(one) for name, one in by_speed.items()}
     name = max(answered, key=lambda one: answered[one])
     interchanged = proportional(moved.position, by_speed[name].acceleration).share > _DERIVED
-    return name if answered[name] > max(explained(moved), 0.0) + EXPLAINED and not interchanged else None
+    if answered[name] <= max(explained(moved), 0.0) + EXPLAINED or interchanged:
+        return None
+    return name, f"its derivative is not {name}, with which inertia and friction explain the torque better"
 
 
 def _told(one: Label, constants: Collection[Constant]) -> int:

@@ -16,15 +16,16 @@ from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
 from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
 from hil.importing.header_rows import read_factor
-from hil.importing.header_values import HeaderValue, header_values
+from hil.importing.header_values import HeaderValue
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import SECONDS, CsvOptions
 from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
+from hil.importing.stated import Stated
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
 from hil.importing.variables import load_variables
-from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit
+from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit, stored_values
 
 LEAST_NUMBERS = 0.01  # share of rows with a number: with fewer a column is one of text
 MOST_COLUMNS = 1000  # whose names are read, 1 ms each
@@ -121,7 +122,7 @@ def _text(path: Path) -> ForeignTable:
         columns,
         units,
         csv=options,
-        constants=_counted_period(dialect.above, rows.lines.size) | header_values(dialect.above, {}),
+        constants=_counted_period(dialect.above, rows.lines.size) | Stated().constants(dialect.above, columns, units),
         remarks=tuple(remarks),
         dates=frozenset(rows.dates),
         texts={name: cell for name, cell in rows.texts.items() if name in columns},
@@ -157,14 +158,16 @@ def _counted_period(lines: Sequence[str], rows: int) -> dict[Constant, HeaderVal
 
 
 def _mat(path: Path) -> ForeignTable:
-    columns, scalars, others = dict[str, FloatArray](), dict[str, float](), []
+    columns, others, stated = dict[str, FloatArray](), [], Stated()
     arrays, units = load_variables(path)
     for name, variable in arrays.items():
         values = np.asarray(variable)
-        if values.dtype.kind not in "fiub":
+        if values.dtype.kind == "U" and values.size == 1:
+            stated.texts[name] = str(values.reshape(-1)[0])
+        elif values.dtype.kind not in "fiub":
             others.append(name)
         elif values.size == 1:
-            scalars[name] = float(values.reshape(-1)[0])
+            stated.numbers[name] = float(values.reshape(-1)[0])
         elif values.size == max(values.shape):
             columns[name] = values.reshape(-1)
         elif values.ndim == 2 and values.shape[1] <= WIDEST and values.shape[0] > values.shape[1]:
@@ -177,7 +180,9 @@ def _mat(path: Path) -> ForeignTable:
             f"{path}: holds no vector of numbers (there are {listed(others) or 'no variables'}), allowed a vector "
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    return ForeignTable(path, columns, units, scalars, constants=header_values((), scalars), remarks=tuple(remarks))
+    units = stated.units_of(columns) | units
+    constants = stated.constants((), columns, units)
+    return ForeignTable(path, columns, units, stated.numbers, constants=constants, remarks=tuple(remarks))
 
 
 def _parquet(path: Path) -> ForeignTable:
@@ -197,7 +202,19 @@ def _parquet(path: Path) -> ForeignTable:
             dates.add(one.name)
         else:
             remarks.append(f"{one.name}: {one.type} values, no numbers; convert the column to use it")
-    return ForeignTable(path, columns, units, remarks=tuple(remarks), dates=frozenset(dates))
+    stored = stored_values(schema)
+    texts = {name: value for name, value in stored.items() if isinstance(value, str)}
+    stated = Stated({name: value for name, value in stored.items() if not isinstance(value, str)}, texts)
+    units = stated.units_of(columns) | units
+    return ForeignTable(
+        path,
+        columns,
+        units,
+        stated.numbers,
+        constants=stated.constants((), columns, units),
+        remarks=tuple(remarks),
+        dates=frozenset(dates),
+    )
 
 
 def _records(path: Path) -> ForeignTable:
@@ -214,13 +231,14 @@ def _records(path: Path) -> ForeignTable:
         else:
             other = next(value for value in values if isinstance(value, str | bool | list | dict))
             remarks.append(f"{name}: values such as {other!r}, no numbers")
-    constants = header_values((), content.scalars)
+    stated = Stated(content.scalars, content.texts)
+    units = stated.units_of(columns) | content.units
     return ForeignTable(
         path,
         columns,
-        content.units,
-        content.scalars,
-        constants=constants,
+        units,
+        stated.numbers,
+        constants=stated.constants((), columns, units),
         remarks=tuple(remarks),
         dates=frozenset(dates),
         texts=records.texts,

@@ -9,6 +9,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from hil.importing.lexicon import Constant, ConstantWords, lexicon, without_accents
 from hil.importing.units import unit_named
 from hil.quantities import UNITS
@@ -40,8 +42,11 @@ _SIGNS = re.compile(r"[\s·・*.\"']+")  # between the parts of a unit
 _TEXT_OF_NAME = re.compile(r"[^\w/]+|_")
 _PER = re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
+_WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
 _MOST_BITS = 40.0  # of an encoder
+_SYMBOL = 3  # letters of a symbol, which stands for something else as well
+_IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
 
 
 def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Constant, HeaderValue]:
@@ -52,7 +57,8 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
         given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}"))
     found: dict[tuple[bool, Constant], list[HeaderValue]] = {}
     for one in given:
-        if told := next((known for unit in one.units if (known := _constant(one.words, one.number, unit))), None):
+        units = one.units if any(one.units) else (*one.units, None)
+        if told := next((known for unit in units if (known := _constant(one.words, one.number, unit))), None):
             by_words, constant, value = told
             found.setdefault((by_words, constant), []).append(HeaderValue(value, one.text))
     # what words say goes before what a unit alone says
@@ -71,6 +77,10 @@ def _statements(line: str) -> Iterator[_Statement]:
     if turn := _TURN_IS.match(folded):
         size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
         yield from [_Statement("", size, (unit,), line.strip())] if size is not None else []
+        return
+    if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole[1])) is not None:
+        unit = _SIGNS.sub("", whole[2])
+        yield from (_Statement(words, size, (unit,), _shown(line)) for words in ("rated torque", "rated force"))
         return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
@@ -113,16 +123,23 @@ def _units_behind(text: str) -> Iterator[str]:
         yield ""
 
 
-def _constant(words: str, value: float, unit: str) -> tuple[bool, Constant, float] | None:
-    """Constant that words and unit tell, True if the words do, and its value in SI."""
-    if value <= 0.0:
+def _constant(words: str, value: float, unit: str | None) -> tuple[bool, Constant, float] | None:
+    """Constant that words and unit tell, True if the words do, and its value in SI; `unit` is None where none is given.
+
+    Without a unit only words that stand for nothing else are taken, not those of a lead, which may be in mm or m.
+    """
+    if not 0.0 < value < np.inf:
         return None
-    ratio = _of_ratio(value, _amperes(unit))
+    ratio = _of_ratio(value, _amperes(unit)) if unit else None
     for constant, known in lexicon().constants.items():
         if not re.search(_pattern(known), words):
             continue
         if ratio and ratio[0] is constant:
             return True, *ratio
+        if unit is None:
+            if constant in _IN_SI and _says_all(known, words):
+                return True, constant, value
+            continue
         if unit in known.units:
             si = value * known.units[unit]
             if constant is not Constant.PERIOD:
@@ -132,6 +149,13 @@ def _constant(words: str, value: float, unit: str) -> tuple[bool, Constant, floa
     if ratio and not any(re.search(rf"\b{other}\b", words) for other in lexicon().other_constants):
         return False, *ratio
     return None
+
+
+def _says_all(known: ConstantWords, words: str) -> bool:
+    """True if words that end a text are no symbol of two letters, unless that of a torque or force constant."""
+    match = re.search(_pattern(known), words)
+    found = match[1].replace(" ", "") if match else ""
+    return len(found) > _SYMBOL or (found in lexicon().scalars.constant and found != "km")
 
 
 def _of_ratio(value: float, unit: str) -> tuple[Constant, float] | None:

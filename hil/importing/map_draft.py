@@ -1,10 +1,13 @@
 """A drafted map: clock, channels with how they were found, and what is unsure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from hil.channels import CHANNELS
 from hil.importing.clock import StampClock
 from hil.importing.foreign_table import ForeignTable
+from hil.importing.questions import missing_column
 
 
 @dataclass(frozen=True)
@@ -42,3 +45,11 @@ class MapDraft:
     unsure: list[str] = field(default_factory=list)
     asked: list[Asked] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
+
+
+def ask_column(draft: MapDraft, channel: str, what: str, unit_question: str, columns: Sequence[str]) -> None:
+    """Add a channel of which column and unit are asked; `columns` are those that may be it."""
+    draft.channels.append(DraftedChannel(channel, {"column": "", "unit": CHANNELS[channel].unit}, "not found"))
+    draft.asked.append(Asked(channel, "column", missing_column(what, columns, channel)))
+    of_column = unit_question.replace("its unit is not in the file; ", "of that column; ")
+    draft.asked.append(Asked(channel, "unit", of_column))

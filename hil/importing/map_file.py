@@ -133,6 +133,12 @@ class ChannelSource(_Strict):
         """True if the column is an angle."""
         return self.counts_per_rev is not None or UNITS.get(self.unit, ("",))[0] == "rad"
 
+    @property
+    def constant_of_one(self) -> str | None:
+        """Constant of an effort that is given as 1, as the map asks where nobody knows it; None for another value."""
+        efforts = [field for unit, fields in _CONSTANTS.items() if unit != "counts" for field in fields]
+        return next((field for field in efforts if getattr(self, field) == 1.0), None)
+
     def factor_to(self, si: str, lead_m: float | None, gain: float = 1.0) -> float | None:
         """Factor from the column to the SI unit `si`, with sign and scale; None if the unit does not convert.
 

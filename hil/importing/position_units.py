@@ -9,8 +9,8 @@ from hil.importing.encoder_counts import angle_unit
 from hil.importing.header_rows import NAMELESS
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import MapDraft
-from hil.importing.relations import proportional
-from hil.importing.roles import SAME_POSITION, Roles
+from hil.importing.relations import SAME_POSITION, proportional
+from hil.importing.roles import Roles
 from hil.importing.unit_choice import (
     MATCH,
     UnitChoice,

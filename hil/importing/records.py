@@ -70,7 +70,7 @@ def _put_together(
     lists = {of.time: found.stamps.tolist()} | {name: values.tolist() for name, values in found.columns.items()}
     units = content.units | found.told | ({of.time: "s"} if found.dates else {})
     texts = {name: Cell(number(row), text) for name, (row, text) in found.texts.items()}
-    return Records(RecordColumns(lists, content.scalars, units), found.units, texts, found.notes)
+    return Records(RecordColumns(lists, content.scalars, units, content.texts), found.units, texts, found.notes)
 
 
 def _of_texts(content: RecordColumns) -> Records:
@@ -87,7 +87,7 @@ def _of_texts(content: RecordColumns) -> Records:
             if cells.texts:
                 row = min(cells.texts)
                 texts[name] = Cell(row + 1, cells.texts[row])
-    return Records(RecordColumns(lists, content.scalars, content.units), units, texts)
+    return Records(RecordColumns(lists, content.scalars, content.units, content.texts), units, texts)
 
 
 def _text(value: object) -> str:

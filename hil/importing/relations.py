@@ -15,6 +15,8 @@ from hil.identification.least_squares import LinearFit, least_squares
 from hil.identification.plain_model import plain_columns
 
 SMOOTH = 0.3  # roughness of a motion; rows without order have 1.4
+SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
+IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: counting and filters leave a few per cent
 NO_SPREAD = 0.01  # of the travel: a part of a recording with less motion tells nothing
 
 

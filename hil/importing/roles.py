@@ -1,25 +1,30 @@
 """Assign columns to roles (motor, table, set-points, torque): by their names, else by relations between the columns."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.identification.derivatives import MeasuredMotion, motion, smoothed
+from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one, unanswered_one
-from hil.importing.effort_roles import better_speed, choose_efforts
+from hil.importing.effort_roles import EXPLAINED, better_speed, choose_efforts
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.monitor_outputs import monitor_outputs
 from hil.importing.one_axis import one_axis
-from hil.importing.relations import SMOOTH, derivative_of, driven, noise, proportional, roughness
+from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, driven, proportional
+from hil.importing.unnamed_columns import quantities_by_relations
 
-SAME_POSITION = 0.98  # share from which a column is another reading of a position: following errors are below 5 %
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
-IS_DERIVATIVE = 0.9  # share from which a column is the velocity of another: counting and filters leave a few per cent
-IS_DRIVEN = 0.4  # share of an unnamed effort that one mass with friction explains: gravity and springs may be more
+_ALONE = "a set-point of the velocity; the control law is read from set-points of the position"
+_NO_ROLE = {
+    Quantity.OTHER: "by its name an error, a limit, a temperature or a state",
+    Quantity.ACCELERATION: "an acceleration follows from the position",
+    Quantity.TIME: "another time",
+    Quantity.UNKNOWN: "its name says nothing, and no relation to the motion is found",
+}
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
 
 
@@ -68,24 +73,22 @@ def find_roles(
     roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
     labels = {name: label for name, label in labels.items() if name not in frozen}
     live = {name: columns[name] for name in columns if name in labels}
-    labels = _with_quantities(live, labels, period_s, roles)
+    labels, roles.how = quantities_by_relations(live, labels, period_s)
+    roles.unsure += [f"{name}: its name says nothing; {how}" for name, how in roles.how.items()]
     if outputs := monitor_outputs(live, labels, period_s):
         labels |= outputs.labels
         roles.unsure.append(outputs.note)
     of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}
-    for name in of[Quantity.OTHER] + of[Quantity.ACCELERATION]:
-        roles.left_out.setdefault(name, f"{labels[name].quantity} by its name, not needed")
+    for kind, why in _NO_ROLE.items():
+        roles.left_out |= {name: roles.left_out.get(name, why) for name in of[kind]}
     _positions(live, labels, of[Quantity.POSITION], bool(of[Quantity.EFFORT]), roles, period_s)
     moved = motion(live[roles.motor], period_s) if roles.motor else None
     speeds = {name: live[name] for name in of[Quantity.VELOCITY] if not labels[name].command}
     speed = better_speed(speeds, [live[name] for name in of[Quantity.EFFORT]], moved, period_s) if moved else None
     if speed is not None:
-        roles.unsure.append(
-            f"{roles.motor}: its derivative is not {speed}, with which inertia and friction explain the torque better; "
-            f"{speed} is taken for the motion"
-        )
-        for name in of[Quantity.POSITION]:
-            roles.left_out[name] = f"no position whose derivative is {speed}"
+        name, why = speed
+        roles.unsure.append(f"{roles.motor}: {why}; {name} is taken for the motion")
+        roles.left_out |= dict.fromkeys(of[Quantity.POSITION], f"no position whose derivative is {name}")
         roles.motor = roles.table = roles.command = roles.unfollowed = moved = None
     _velocities(where, live, labels, of[Quantity.VELOCITY], moved, period_s, roles)
     if moved is None and roles.motor_velocity:
@@ -95,85 +98,34 @@ def find_roles(
         roles.effort, roles.effort_command = found.measured, found.command
         roles.left_out |= found.left_out
         roles.unsure += found.unsure
-    if roles.motor is None and roles.motor_velocity is None:
+        roles.unsure += _of_two_axes(live, labels, moved, period_s, roles)
+    if roles.motor is None and roles.motor_velocity is None and len(may_be_asked(columns, labels)) < 2:
         told = f"; constant are {listed(frozen)}" if frozen else ""
         raise InputError(
-            f"{where}: no column is the measured position of the axis (columns: {listed(columns)}{told}); "
-            "record it, or write its column into a map: hil import FILE --map MAP.yaml"
+            f"{where}: no column is the measured position of the axis (columns: {listed(columns)}{told}); record "
+            "it with the torque"
         )
     return roles
 
 
-def _with_quantities(
-    live: dict[str, FloatArray], labels: dict[str, Label], period_s: float, roles: Roles
-) -> dict[str, Label]:
-    """Quantities of columns whose names give none, from their relations to a position."""
-    told, labels = labels, dict(labels)
-    for name in live:  # a letter is a name by chance: the data say more, where they say something
-        if told[name].letter and told[name].unit is None:
-            labels[name] = replace(told[name], quantity=Quantity.UNKNOWN)
-    unnamed = [name for name in live if labels[name].quantity is Quantity.UNKNOWN]
-    positions = [name for name in live if labels[name].quantity is Quantity.POSITION]
-    if not unnamed:
-        return labels
-
-    def become(name: str, quantity: Quantity, how: str) -> None:
-        labels[name] = replace(labels[name], quantity=quantity)
-        roles.how[name] = how
-        roles.unsure.append(f"{name}: its name says nothing; {how}")
-
-    if not positions:
-        smooth = [name for name in unnamed if roughness(live[name]) < SMOOTH]
-        named = [name for name in smooth if told[name].quantity is Quantity.POSITION]
-        scores = {name: _as_position(name, live, period_s) for name in named or smooth}
-        if named and max(scores.values()) < IS_DRIVEN:
-            scores = {name: _as_position(name, live, period_s) for name in smooth}
-        best = max(scores, key=lambda name: scores[name], default=None)
-        if best is None or scores[best] < IS_DRIVEN or _better_as_told(best, live, told, period_s):
-            return told
-        become(best, Quantity.POSITION, "a position: other columns follow from its derivatives")
-        positions, unnamed = [best], [name for name in unnamed if name != best]
-    for name in unnamed:
-        moved = {position: motion(live[position], period_s) for position in positions}
-        if any(proportional(live[name], live[position]).share > SAME_POSITION for position in positions):
-            become(name, Quantity.POSITION, f"a position: it follows {positions[0]}")
-        elif any(derivative_of(live[name], one, period_s).share > IS_DERIVATIVE for one in moved.values()):
-            become(name, Quantity.VELOCITY, f"a velocity: it is the derivative of {positions[0]}")
-        elif any(_accelerates(live[name], one, period_s) for one in moved.values()):
-            become(name, Quantity.ACCELERATION, f"an acceleration: the second derivative of {positions[0]}")
-        elif max(driven(live[name], one, period_s).share for one in moved.values()) > IS_DRIVEN:
-            effort = "torque, force, current or voltage"
-            become(name, Quantity.EFFORT, f"{effort}: inertia and friction of {positions[0]} explain it")
-        elif told[name].quantity is not Quantity.UNKNOWN:
-            labels[name] = told[name]
-        else:
-            roles.left_out[name] = "no relation to the motion is found"
-    return labels
+def may_be_asked(columns: dict[str, FloatArray], labels: dict[str, Label], used: Collection[str] = ()) -> list[str]:
+    """Columns (n,) that move, are not `used`, and whose names do not say that they are no channel."""
+    none = (Quantity.OTHER, Quantity.ACCELERATION, Quantity.TIME)
+    open_ones = [name for name in columns if name in labels and name not in used and labels[name].quantity not in none]
+    return [name for name in open_ones if np.ptp(columns[name]) > 0.0]
 
 
-def _better_as_told(best: str, live: dict[str, FloatArray], told: dict[str, Label], period_s: float) -> bool:
-    """True if letters name a speed and an effort, and that speed explains it better than `best` as a position does."""
-    speeds = [name for name in live if told[name].quantity is Quantity.VELOCITY and not told[name].command]
-    efforts = [live[name] for name in live if told[name].quantity is Quantity.EFFORT]
-    by_speed = [motion(np.cumsum(live[name]) * period_s, period_s) for name in speeds]
-    shares = [driven(effort, moved, period_s).share for effort in efforts for moved in by_speed]
-    as_position = [driven(effort, motion(live[best], period_s), period_s).share for effort in efforts]
-    return bool(shares) and max(shares) > max(as_position)
-
-
-def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> float:
-    """Sum of the shares of the other columns that the derivatives of `name`, as a position, explain."""
-    moved = motion(live[name], period_s)
-    total = 0.0
-    for other, values in live.items():
-        if other == name or proportional(values, live[name]).share > SAME_POSITION:
-            continue
-        total += max(derivative_of(values, moved, period_s).share, driven(values, moved, period_s).share)
-    return total - 0.01 * noise(live[name])
-
-
-def _accelerates(values: FloatArray, moved: MeasuredMotion, period_s: float) -> bool:
-    return proportional(smoothed(values, period_s), moved.acceleration).share > IS_DERIVATIVE
+def _of_two_axes(
+    live: dict[str, FloatArray], labels: dict[str, Label], moved: MeasuredMotion, period_s: float, roles: Roles
+) -> list[str]:
+    """Note on an effort that the motion hardly explains, and whose name tells another axis; empty without."""
+    moving, driving = roles.motor or roles.motor_velocity, roles.effort or roles.effort_command
+    if not moving or not driving or driven(live[driving], moved, period_s).share > EXPLAINED:
+        return []
+    one, other = labels[moving].number, labels[driving].number
+    if not one or not other or one == other:
+        return []
+    return [f"{driving}: by its name of axis {other}, {moving} of axis {one}; check that it drives this axis"]
 
 
 def _positions(
@@ -206,13 +158,20 @@ def _positions(
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
         measured = [name for name in measured if name not in commands]
     if not measured:
+        roles.left_out |= dict.fromkeys(commands, "a set-point beside no measured position")
         return
     far = [name for name in measured if labels[name].table]
     near = [name for name in measured if not labels[name].table] or far
     roles.motor = next((name for name in near if labels[name].motor), None) or min(
-        near, key=lambda name: (not labels[name].measured, int(labels[name].number or 0), near.index(name))
+        near, key=lambda name: (not labels[name].measured, labels[name].number.zfill(9), near.index(name))
     )
     rest = [name for name in (*far, *near) if name != roles.motor]
+    for name in [one for one in rest if not labels[one].table]:
+        share = proportional(live[name], live[roles.motor]).share
+        if share < FOLLOWED:
+            rest.remove(name)
+            roles.left_out[name] = f"a position that does not follow {roles.motor} (share {share:.2f})"
+            roles.unsure.append(f"{name}: does not follow {roles.motor} (share {share:.2f}): of another axis, not used")
     if rest:
         roles.table = rest[0]
         if not labels[rest[0]].table:
@@ -251,11 +210,15 @@ def _velocities(
 ) -> None:
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if not labels[name].command]
-    roles.velocity_command = commands[0] if commands else None
     if moved is None or roles.motor is None:
+        roles.left_out |= dict.fromkeys(commands, _ALONE)
         near = [name for name in measured if not labels[name].table]
         roles.motor_velocity = next(iter(near or measured), None)
+        others = [name for name in measured if name != roles.motor_velocity]
+        roles.left_out |= dict.fromkeys(others, "another velocity")
         return
+    roles.velocity_command = commands[0] if commands else None
+    roles.left_out |= dict.fromkeys(commands[1:], "another set-point of the velocity")
     for name in measured:
         share = derivative_of(live[name], moved, period_s).share
         roles.left_out[name] = "velocity of the motion, follows from the position"

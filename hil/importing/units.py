@@ -26,6 +26,7 @@ _FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\
 LEAST_ALONE = 3  # letters of a unit that is a name by itself, or of revolutions: motor_u is a voltage
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
 _SLASH = re.compile(r"^\s*[^/\s]+\s*/\s*(\S+)\s*$")  # DIN 461: x/mm
+_PART_OF = re.compile(r"(?:^|\s)(\S+)\s+(?:of|der|des|vom|du|de la|del|della)\s")
 _WORD_IN = re.compile(r"\bin\s+(\S+)\s*$")  # Weg in mm
 
 
@@ -53,6 +54,13 @@ def unit_of_text(text: str) -> str | None:
     whole = unit_named(text.strip(" []()"))
     bracket = _BRACKETS.search(text)
     return whole or (unit_named(text[: bracket.start()]) or unit_named(bracket[1]) if bracket else None)
+
+
+def unit_of_part(text: str) -> str | None:
+    """% or permille of a text that says in which part of what a value is: in 1/1000 of the rated torque."""
+    match = _PART_OF.search(text.lower())
+    unit = unit_named(match[1]) if match else None
+    return unit if unit in ("%", "permille") else None
 
 
 def factor_and_unit(text: str) -> tuple[float, str] | None:

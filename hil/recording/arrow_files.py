@@ -10,6 +10,7 @@ import json
 import os
 import struct
 from collections.abc import Collection
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from hil.errors import InputError, listed
 from hil.files.input_file import check_file, check_values, parsing
 
 METADATA_KEY = b"hil"  # of the schema: the metadata as JSON
+_LONGEST_TEXT = 100  # characters of a stored text that may be a constant or a unit
 FORMATS = "the path of a recording: .parquet, .arrows (a run that was not closed) or .csv"
 _DAMAGED = "it is cut or damaged: read the .arrows file of the run if there is one"
 _UNWRITTEN = "nothing of the run was written yet, or it is another file"
@@ -142,6 +144,25 @@ def stored_unit(schema: pa.Schema, name: str) -> str | None:
     """The unit that a file gives with a column; None without one."""
     unit = (schema.field(name).metadata or {}).get(b"unit")
     return None if unit is None else unit.decode(errors="replace")
+
+
+def stored_values(schema: pa.Schema) -> dict[str, float | str]:
+    """Numbers and texts that other programs than this store with a table, by name; those of pandas are its attrs."""
+    found: dict[str, Any] = {}
+    for key, stored in (schema.metadata or {}).items():
+        text = stored.decode(errors="replace")
+        if key == b"PANDAS_ATTRS":
+            with suppress(ValueError):  # no JSON, no mapping
+                found |= dict(json.loads(text))
+        elif len(text) <= _LONGEST_TEXT:
+            found[key.decode(errors="replace")] = text
+    values: dict[str, float | str] = {}
+    for name, value in found.items():
+        try:
+            values[name] = float(value)
+        except (ValueError, TypeError):
+            values[name] = str(value)
+    return values
 
 
 def stored_metadata(path: Path, schema: pa.Schema) -> dict[str, Any]:

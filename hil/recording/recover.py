@@ -68,8 +68,8 @@ def remains(stream: Path) -> Iterator[Remains]:
     """Read the rows of a run from its Arrow stream and from memory.
 
     The memory is removed when the block ends without error.
-    Raises InputError if there is no such file, if it is no stream of a run, or if its recorder still works; HilError
-    if no row is left.
+    Raises InputError if there is no such file, if it is no stream of a run, if its recorder still works, or if the rows
+    in memory are of another user; HilError if no row is left.
     """
     if stream.suffix != ".arrows" or not stream.is_file():
         raise InputError(f"{stream}: given no .arrows file, allowed the stream of a run that was not closed")
@@ -131,41 +131,63 @@ def _kept(ring: Ring) -> tuple[int, FloatArray]:
 
 
 def unfinished() -> list[Path]:
-    """Streams of runs whose processes have ended, and of which rows are in memory."""
+    """Streams of runs of this user whose processes have ended, and of which rows are in memory; for root of all."""
     found = []
     for ring in _rings():
         with suppress(BlockingIOError):
-            fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            found.append(Path(ring.task["path"]))
+            if _may_take(ring):
+                fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                found.append(Path(ring.task["path"]))
         ring.release()
     return found
 
 
+def _may_take(ring: Ring) -> bool:
+    """True for a ring of this user, and for root: another one may hold anything, and be changed while it is read."""
+    return os.geteuid() in (0, ring.owner)
+
+
 def _ring_of(stream: Path) -> Ring | None:
-    """Find and lock the ring of a stream; None if there is none. Raises InputError if its recorder still works."""
-    found = None
+    """Find and lock the ring of a stream; None if there is none.
+
+    Raises InputError if its recorder still works, or if only another user has a ring of this stream.
+    """
+    foreign = ""
     for ring in _rings():
-        if found is not None or ring.task["path"] != str(stream.resolve()):
-            ring.release()
-            continue
-        found = ring
-        try:
-            fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            pid = ring[Counter.WRITER_PID]
-            ring.release()
-            raise InputError(
-                f"{stream}: its recorder still works (process {pid}); wait until the run is over, or end a process "
-                "that hangs"
-            ) from None
-    return found
+        if ring.task["path"] != str(stream.resolve()):
+            pass
+        elif not _may_take(ring):
+            foreign = f"{ring.path} is of the user {ring.owner}"
+        else:
+            _lock(ring, stream)
+            return ring
+        ring.release()
+    if foreign:
+        raise InputError(
+            f"{stream}: its rows in memory, {foreign}, allowed are those of your own user ({os.geteuid()}); recover it "
+            "as the user of the run or as root, or remove that file if it is not of this run"
+        )
+    return None
+
+
+def _lock(ring: Ring, stream: Path) -> None:
+    """Lock a ring. Raises InputError, and releases it, if its recorder still works."""
+    try:
+        fcntl.flock(ring.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        pid = ring[Counter.WRITER_PID]
+        ring.release()
+        raise InputError(
+            f"{stream}: its recorder still works (process {pid}); wait until the run is over, or end a process that "
+            "hangs"
+        ) from None
 
 
 def _rings() -> Iterator[Ring]:
-    """Open the rings of this user; the caller releases them."""
+    """Open the rings that this user may read; the caller releases them."""
     for path in FOLDER.glob(PATTERN):
         try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+            descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
         except OSError:  # of another user, or just removed
             continue
         try:

@@ -129,6 +129,11 @@ class Ring:
         """Where the ring is found by others."""
         return Path(os.readlink(f"/proc/self/fd/{self.descriptor}"))
 
+    @property
+    def owner(self) -> int:
+        """User id of the run."""
+        return os.fstat(self.descriptor).st_uid
+
     def remove(self) -> None:
         """Remove the file; its processes keep the memory until they end."""
         with contextlib.suppress(FileNotFoundError):

@@ -16,6 +16,7 @@ from recorders import ROWS, Loop, assert_holds, recorder, recover, rings, row
 from hil.errors import InputError
 from hil.recording.recording import read_recording
 from hil.recording.recover import remains, unfinished
+from hil.recording.ring import Ring
 
 
 def test_a_keeper_that_is_killed_is_replaced_at_the_end(tmp_path: Path) -> None:
@@ -70,6 +71,50 @@ def test_all_processes_killed_at_once_lose_nothing_that_is_in_memory(tmp_path: P
     assert run["max_s"] == (ROWS - 1) * 1e-7
     assert not rings(loop.process.pid)
     assert (tmp_path / "run.arrows").exists()
+
+
+def test_rows_in_memory_of_another_user_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loop, stream = Loop(tmp_path), tmp_path / "run.arrows"
+    loop.kill(loop.keeper, loop.writer)
+    (ring,) = rings(loop.process.pid)
+    owner = ring.stat().st_uid
+    with monkeypatch.context() as as_another:
+        as_another.setattr(os, "geteuid", lambda: owner + 1)
+        assert stream not in unfinished()
+        with (
+            pytest.raises(
+                InputError, match=rf"{ring} is of the user {owner}, allowed .* \({owner + 1}\); recover it as"
+            ),
+            remains(stream),
+        ):
+            pass
+    assert stream in unfinished()
+    with monkeypatch.context() as as_root:
+        as_root.setattr(os, "geteuid", lambda: 0)
+        as_root.setattr(Ring, "owner", 1000)
+        with remains(stream) as found:
+            assert len(found.rows) == ROWS
+    assert not rings(loop.process.pid)
+
+
+def test_a_ring_that_another_user_plants_does_not_hide_the_own_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A user is the owner of a file; the copy counts as of another one by its name."""
+    loop, stream = Loop(tmp_path), tmp_path / "run.arrows"
+    loop.kill(loop.keeper, loop.writer)
+    (ring,) = rings(loop.process.pid)
+    planted = ring.with_name(f"{ring.name}-planted")
+    planted.write_bytes(ring.read_bytes())
+    try:
+        monkeypatch.setattr(Ring, "owner", property(lambda one: os.geteuid() + (one.path == planted)))
+        monkeypatch.setattr(os, "geteuid", lambda: 1000)
+        with remains(stream) as found:
+            assert len(found.rows) == ROWS
+        assert planted.exists()
+        assert not ring.exists()
+    finally:
+        planted.unlink()
 
 
 def test_a_stopped_loop_s_rows_reach_the_disk(tmp_path: Path) -> None:

@@ -1,0 +1,60 @@
+"""What a file states beside its columns by name: numbers and texts, a constant as a column, units of all of them.
+
+kt = 0.83, kt_unit = "Nm/A"        torque_constant.value = 0.83, torque_constant.unit = "Nm/A"
+torque_constant = "0.83 Nm/A"      a column kt [Nm/A] with 0.83 in every row
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.importing.header_values import HeaderValue, header_values
+from hil.importing.lexicon import Constant, RowKind, lexicon, without_accents
+
+_VALUE = re.compile(r"(.+?)[\W_]*(value|wert)")
+
+
+@dataclass(frozen=True)
+class Stated:
+    """Numbers and texts of a file by name; of a name with points the last part says what it is."""
+
+    numbers: dict[str, float] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Texts that are the unit of something, by `_plain` of its name."""
+        ending = re.compile(rf"(.+?)[\W_]*(?:{lexicon().rows[RowKind.UNITS]})")
+        matches = ((ending.fullmatch(_plain(name)), text) for name, text in self.texts.items())
+        return {match[1]: text for match, text in matches if match}
+
+    def constants(self, lines: Iterable[str] = (), columns: Mapping[str, FloatArray] | None = None,
+                  units: Mapping[str, str] | None = None) -> dict[Constant, HeaderValue]:  # fmt: skip
+        """Constants of header `lines`, numbers and texts, and of `columns` (n,) with one value, with their `units`."""
+        own = self.units
+        texts = [f"{name}: {text}" for name, text in self.texts.items()]
+        for name, values in (columns or {}).items():
+            if np.isfinite(values).all() and np.ptp(values) == 0.0:
+                unit = (units or {}).get(name)
+                texts.append(f"{name}{f' [{unit}]' if unit else ''}: {values[0]:.12g}")
+        sized = {}
+        for name, number in self.numbers.items():
+            value = _VALUE.fullmatch(_plain(name))
+            unit = own.get(_plain(name)) or (own.get(value[1]) if value else None)
+            if unit:
+                texts.append(f"{name[: value.end(1)] if value else name}: {number:.12g} {unit}")
+            else:
+                sized[name] = number
+        return header_values([*lines, *texts], sized)
+
+    def units_of(self, columns: Iterable[str]) -> dict[str, str]:
+        """Units of columns by texts with their name: torque_unit = "Nm"."""
+        own = self.units
+        return {name: own[_plain(name)] for name in columns if _plain(name) in own}
+
+
+def _plain(name: str) -> str:
+    return without_accents(name).lower()

@@ -1,0 +1,101 @@
+"""Which column is the motion: following errors and speeds among columns that look like positions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import axis, renamed, write
+
+from hil.importing.column_names import label
+from hil.importing.draft_map import draft_map
+from hil.importing.lexicon import Quantity
+
+AXIS = axis()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "droop pulses [pulse]", "溜りパルス[pulse]", "位置偏差[pulse]", "滞留脉冲 [inc]", "Schleppfehler [Inkr]",
+        "Erreur de trainage [inc]", "scarto di posizione [inc]", "desviacion de posicion [inc]", "volgfout [inc]",
+        "рассогласование [inc]", "joint.0.f-error [inc]", "PosErr [inc]", "FOLLERR [inc]", "position lag [inc]",
+    ],
+)  # fmt: skip
+def test_a_following_error_is_no_position_by_its_name(name: str) -> None:
+    assert label(name).quantity is Quantity.OTHER
+
+
+def test_a_following_error_is_no_position_by_its_values(tmp_path: Path) -> None:
+    """The velocity over the gain, whatever its name."""
+    error = np.round(AXIS["speed"] / 30.0 / 1e-4)
+    columns = {"time_s": AXIS["t"], "P1 [inc]": error, "speed [rad/s]": AXIS["speed"],
+               "torque_Nm": AXIS["torque"]}  # fmt: skip
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert {one.channel: one.entry["column"] for one in draft.channels} == {
+        "motor_velocity_rad_s": "speed [rad/s]",
+        "torque_n_m": "torque_Nm",
+    }
+    assert not draft.asked
+    assert any("grows with speed [rad/s] itself, as a following error does" in note for note in draft.unsure)
+
+
+def test_a_speed_by_its_letter_is_no_position_where_it_explains_a_column_better(tmp_path: Path) -> None:
+    columns = renamed(AXIS, t="t", speed="n", torque="m")
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert {one.channel: one.entry["column"] for one in draft.channels} == {
+        "motor_velocity_rad_s": "n",
+        "torque_n_m": "m",
+    }
+
+
+OTHER = {"angle": AXIS["angle"][::-1] * np.sin(AXIS["t"]), "torque": AXIS["torque"][::-1] * np.cos(5.0 * AXIS["t"])}
+NAMED = [
+    ("ActPos [u1, {}]", "CmdTorque [u1, {}]", "1", "2"),
+    ("pos({})", "torque({})", "1", "2"),
+    ("Pos{} [rad]", "Torque{} [Nm]", "X", "Y"),
+    ("{}_act_position_rad", "{}_act_torque_Nm", "x", "z"),
+    ("Axis {} angle (rad)", "Axis {} torque (Nm)", "C", "B"),
+]
+
+
+@pytest.mark.parametrize(("position", "torque", "own", "other"), NAMED)
+@pytest.mark.parametrize("asked", [False, True])
+def test_columns_of_another_axis_are_left_out_with_a_hint_at_axis(
+    tmp_path: Path, position: str, torque: str, own: str, other: str, asked: bool
+) -> None:
+    columns = {"time_s": AXIS["t"], position.format(own): AXIS["angle"], position.format(other): OTHER["angle"],
+               torque.format(own): AXIS["torque"], torque.format(other): OTHER["torque"]}  # fmt: skip
+    draft = draft_map(write_quoted(tmp_path / "log.csv", columns), axis=own if asked else other.upper())
+    wanted = own if asked else other
+    used = [str(one.entry["column"]) for one in draft.channels]
+    assert used == [position.format(wanted), torque.format(wanted)]
+    assert len(draft.left_out) == 2
+    hint = draft_map(tmp_path / "log.csv").unsure[0]
+    assert f"--axis {max(own, other).lower()}" in hint or f"--axis {min(own, other).lower()}" in hint
+
+
+def write_quoted(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    write(path, columns)
+    _, _, rows = path.read_text().partition("\n")
+    path.write_text(",".join(f'"{name}"' for name in columns) + "\n" + rows)
+    return path
+
+
+def test_a_position_that_does_not_follow_is_no_second_encoder(tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "motor_angle_rad": AXIS["angle"], "angle of the feeder [rad]": OTHER["angle"],
+               "torque_Nm": AXIS["torque"]}  # fmt: skip
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert [one.channel for one in draft.channels] == ["motor_position_rad", "torque_n_m"]
+    assert "does not follow motor_angle_rad" in draft.left_out["angle of the feeder [rad]"]
+
+
+@pytest.mark.parametrize(("values", "noted"), [(OTHER["torque"], True), (AXIS["torque"], False)])
+def test_a_torque_of_another_axis_by_its_name_is_said_where_the_motion_does_not_explain_it(
+    tmp_path: Path, values: np.ndarray, noted: bool
+) -> None:
+    columns = {"time_s": AXIS["t"], "X1_speed_rad_s": AXIS["speed"], "Y_torque_Nm": values}
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    note = "Y_torque_Nm: by its name of axis y, X1_speed_rad_s of axis 1; check that it drives this axis"
+    assert (note in draft.unsure) is noted

@@ -83,7 +83,7 @@ def _faint(fit: Fit, without: Fit) -> Hypothesis:
     return without.hypothesis.with_term(replace(added[-1], values=tuple(values)))
 
 
-class _Channel(NamedTuple):
+class _Seen(NamedTuple):
     """What a fit leaves of a channel on the rows (m,) that slide: measured, and of the smoothed motion.
 
     `beside` (m, q): what other parameters make. `least` is the energy of a shape that counts.
@@ -99,7 +99,7 @@ class _Channel(NamedTuple):
 class _Asked(NamedTuple):
     """The channels of a fit that a shape may be in, the plain model, and its recordings without noise."""
 
-    channels: dict[str, _Channel]
+    channels: dict[str, _Seen]
     plain: PlainModel
     quiet: Dataset
 
@@ -113,7 +113,7 @@ def _asked(without: Fit) -> _Asked | None:
         return None
     quiet = data.over([one.smooth for one in data.apart] or smoothed_runs(data.runs, plain))
     moved = [measured_motion(run).moved for run in data.runs]
-    steps, found = without.estimator.steps(hypothesis), dict[str, _Channel]()
+    steps, found = without.estimator.steps(hypothesis), dict[str, _Seen]()
     free = [
         index
         for index, one in enumerate(hypothesis.coordinates)
@@ -142,7 +142,7 @@ def _asked(without: Fit) -> _Asked | None:
             if np.isfinite(changed).all():
                 beside.append(changed)
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
-        found[channel] = _Channel(rows, measured, own, np.column_stack(beside), least)
+        found[channel] = _Seen(rows, measured, own, np.column_stack(beside), least)
     return _Asked(found, plain, quiet)
 
 

@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from hil.twin.scene import AxisFacts, Scene
 
+# Largest place on the travel: a motor whose lead is not known may turn for hours [rad].
+ANYWHERE = 1e6
+
 
 class Dimension(StrEnum):
     """Dimension of a parameter; gives its unit on rotary and on linear axes."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
-from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
 _LEAST = 1e-3  # share of the travel beyond the edge, below which a stop is not reached
@@ -53,7 +53,7 @@ MECHANISM = Mechanism(
     "linear as Hooke's law, since a buffer is no sphere",
     parameters=(
         Parameter("stiffness_n_m", Dimension.STIFFNESS, 0.0, 1e7, role=Role.STRENGTH),
-        Parameter("edge_m", Dimension.LENGTH, -100.0, 100.0, scale=_SCALE_M),
+        Parameter("edge_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE, scale=_SCALE_M),
     ),
     variants=(
         Variant(Stage.TABLE_FORCE, _above, "upper end", starts=lambda s: _at(s, upper=True)),

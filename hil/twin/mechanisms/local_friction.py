@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
-from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
 # Shortest flank [m]: an axis needs several internal steps for it, so that the twin is continuous in the edges.
@@ -51,9 +51,9 @@ MECHANISM = Mechanism(
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, -0.9, 5.0, role=Role.STRENGTH),
-        Parameter("begin_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
-        Parameter("end_m", Dimension.LENGTH, -100.0, 100.0, scale=_LENGTH_M),
-        Parameter("flank_m", Dimension.LENGTH, _STEEPEST_M, 1.0),
+        Parameter("begin_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE, scale=_LENGTH_M),
+        Parameter("end_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE, scale=_LENGTH_M),
+        Parameter("flank_m", Dimension.LENGTH, _STEEPEST_M, ANYWHERE),
     ),
     variants=(Variant(Stage.COULOMB, _level_in_zone),),
     text=Text(

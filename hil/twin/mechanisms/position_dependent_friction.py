@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
-from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
 
 
 @njit
@@ -24,7 +24,7 @@ MECHANISM = Mechanism(
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, 0.0, 1.0, role=Role.STRENGTH),
-        Parameter("period_m", Dimension.LENGTH, 1e-4, 1.0, role=Role.PERIOD),
+        Parameter("period_m", Dimension.LENGTH, 1e-4, ANYWHERE, role=Role.PERIOD),
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.COULOMB, _level_along_travel),),

@@ -6,7 +6,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.mechanisms.constant_load import MECHANISM as LOAD
-from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts, Scene
 
 
@@ -15,8 +15,7 @@ def _pull_to_rest(value: float, at: Moment, parameters: Row, memory: Row) -> flo
     return value - parameters[0] * (at.table_position_m - parameters[1])
 
 
-_REACH_M = 10.0  # of the rest position to either side
-_NEAR = 0.9  # of the reach: a rest position beyond is a constant load
+_NEAR = 30.0  # travels: a spring with a rest position farther away is a constant load
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
@@ -26,8 +25,9 @@ def _starts(s: Scene) -> list[tuple[float, ...]]:
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the rest position is not at its bounds."""
-    return abs(values[1]) < _NEAR * _REACH_M
+    """Check that the rest position is near the travel."""
+    first_m, last_m = axis.positions_m
+    return max(first_m - values[1], values[1] - last_m) < _NEAR * axis.travel_m
 
 
 MECHANISM = Mechanism(
@@ -38,7 +38,7 @@ MECHANISM = Mechanism(
     source="Hooke's law; Groß, Hamann and Wiegärtner, Electrical Feed Drives in Automation (2001), load forces",
     parameters=(
         Parameter("stiffness_n_m", Dimension.STIFFNESS, 0.0, 1e7, role=Role.STRENGTH),
-        Parameter("rest_position_m", Dimension.LENGTH, -_REACH_M, _REACH_M),
+        Parameter("rest_position_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _pull_to_rest),),
     text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.POSITION),

@@ -127,7 +127,8 @@ def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> S
         return None
     if np.quantile(steps, _NEARLY_ALL) > _UNEVEN * np.median(steps):
         return None
-    time = coarse.time.model_copy(update={"fraction": TimeColumn(column=name, unit=unit)})
+    part = TimeColumn(column=name, unit=unit)
+    time = TimeColumn(column=coarse.time.column, unit=coarse.time.unit, scale=coarse.time.scale, fraction=part)
     return Stamps(time, seconds, 0.0, True)
 
 

@@ -32,6 +32,7 @@ _CONSTANTS = {
     "%": ("rated",),
     "permille": ("rated",),
     "V": ("gain",),
+    "counts/s": ("counts_per_rev", "counts_per_m"),
 }
 
 
@@ -106,8 +107,8 @@ class ChannelSource(_Strict):
         default=None, description="stamps of this channel, if it has its own: it is interpolated to those of the file"
     )
     sign: Literal[1, -1] = Field(default=1, description="-1 if the column is positive the other way")
-    counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts, rotary encoder")
-    counts_per_m: PositiveFloat | None = Field(default=None, description="unit counts, linear encoder")
+    counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts or counts/s, rotary encoder")
+    counts_per_m: PositiveFloat | None = Field(default=None, description="unit counts or counts/s, linear encoder")
     torque_constant_n_m_a: PositiveFloat | None = Field(default=None, description="unit A, torque")
     force_constant_n_a: PositiveFloat | None = Field(default=None, description="unit A, force")
     rated: PositiveFloat | None = Field(default=None, description="unit % or permille: rated value in SI")
@@ -136,7 +137,7 @@ class ChannelSource(_Strict):
     @property
     def constant_of_one(self) -> str | None:
         """Constant of an effort that is given as 1, as the map asks where nobody knows it; None for another value."""
-        efforts = [field for unit, fields in _CONSTANTS.items() if unit != "counts" for field in fields]
+        efforts = [field for unit, fields in _CONSTANTS.items() if not unit.startswith("counts") for field in fields]
         return next((field for field in efforts if getattr(self, field) == 1.0), None)
 
     def factor_to(self, si: str, lead_m: float | None, gain: float = 1.0) -> float | None:
@@ -144,11 +145,11 @@ class ChannelSource(_Strict):
 
         `gain` is the value of a gain that is given by name.
         """
-        own, constant = self.unit, 1.0
+        own, constant, per_s = self.unit, 1.0, "/s" if self.unit == "counts/s" else ""
         if self.counts_per_rev is not None:
-            own, constant = "rad", 2 * pi / self.counts_per_rev
+            own, constant = f"rad{per_s}", 2 * pi / self.counts_per_rev
         elif self.counts_per_m is not None:
-            own, constant = "m", 1 / self.counts_per_m
+            own, constant = f"m{per_s}", 1 / self.counts_per_m
         elif self.torque_constant_n_m_a is not None:
             own, constant = "N m", self.torque_constant_n_m_a
         elif self.force_constant_n_a is not None:

@@ -50,10 +50,12 @@ def quantities_by_relations(
         if best is None or scores[best] < IS_DRIVEN:
             return told, how
         if speed := _better_as_told(best, live, told, period_s):
-            moved_by = motion(np.cumsum(live[speed]) * period_s, period_s)
-            for name in live:
-                if told[name].quantity is Quantity.UNKNOWN and driven(live[name], moved_by, period_s).share > IS_DRIVEN:
-                    labels[name] = told[name]
+            if not any(one.quantity is Quantity.EFFORT for one in told.values()):
+                moved_by = motion(np.cumsum(live[speed]) * period_s, period_s)
+                untold = [name for name in live if told[name].quantity is Quantity.UNKNOWN]
+                shares = {name: driven(live[name], moved_by, period_s).share for name in untold}
+                name = max(shares, key=lambda one: shares[one])
+                if shares[name] > IS_DRIVEN:
                     become(name, Quantity.EFFORT, f"{_EFFORT}: inertia and friction of {speed} explain it")
             return told | {name: labels[name] for name in how}, how
         become(best, Quantity.POSITION, "a position: other columns follow from its derivatives")

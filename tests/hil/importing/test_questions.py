@@ -84,3 +84,13 @@ def test_a_motion_that_is_not_found_is_asked_for(tmp_path: Path) -> None:
     found = read_recording(tmp_path / "run 1.parquet")
     np.testing.assert_allclose(found["motor_position_rad"], random * 2.0 * np.pi / 1000.0, atol=1e-6)
     np.testing.assert_allclose(found["torque_n_m"], 0.5 * SPIKES, atol=1e-6)
+
+
+def test_a_speed_in_counts_per_second_is_told_by_the_counts_of_a_turn(tmp_path: Path) -> None:
+    per_rev = AXIS["speed"] * 4000.0 / (2.0 * np.pi)
+    columns = {"time_s": AXIS["t"], "actual velocity [counts/s]": per_rev, "torque_Nm": AXIS["torque"]}
+    _, path, command = asked(tmp_path, columns)
+    write_answers(path, ("counts_per_rev", "    counts_per_rev: 4000"))
+    assert hil(tmp_path, *command).returncode == 0
+    found = read_recording(tmp_path / "run 1.parquet")
+    np.testing.assert_allclose(found["motor_velocity_rad_s"], AXIS["speed"], atol=1e-6)

@@ -50,6 +50,12 @@ def test_a_speed_by_its_letter_is_no_position_where_it_explains_a_column_better(
     }
 
 
+def test_row_numbers_are_no_torque_where_one_is_named(tmp_path: Path) -> None:
+    columns = {"No": np.arange(1.0, AXIS["t"].size + 1), "t": AXIS["t"], "n": AXIS["speed"], "torque": AXIS["torque"]}
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert {str(one.entry["column"]) for one in draft.channels} == {"n", "torque"}
+
+
 OTHER = {"angle": AXIS["angle"][::-1] * np.sin(AXIS["t"]), "torque": AXIS["torque"][::-1] * np.cos(5.0 * AXIS["t"])}
 NAMED = [
     ("ActPos [u1, {}]", "CmdTorque [u1, {}]", "1", "2"),

@@ -107,7 +107,8 @@ def _of_torque(
             f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "
             f"+-{plant.one_way.std_error:.2g}: record the way back"
         )
-    sure = "; see mechanisms" if plant.offset.significant else ", not distinguishable from 0"
+    sure = "; see mechanisms of the bench" if plant.offset_held else "; not in the bench"
+    sure = sure if plant.offset.significant else ", not distinguishable from 0"
     notes.append(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
         "friction that differs by direction"
@@ -117,7 +118,7 @@ def _of_torque(
         size = f"{plant.gravity.value:.3g} {noise_unit} +-{plant.gravity.std_error:.2g}"
         notes.append(f"{effort} over the angle (gravity) {size} at the load{sure}")
         if plant.gravity.significant:
-            unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms")
+            unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms of the bench")
     if plant.spring is not None:
         rate = f"{plant.spring.value:.3g} {'N/m' if linear else 'N m/rad'} +-{plant.spring.std_error:.2g} at the motor"
         notes.append(f"{effort} over the position (a spring) {rate}, not in the bench: hil diagnose names it")

@@ -180,7 +180,7 @@ def _loads(draft: BenchDraft, plant: PlantValues) -> None:
     Such an offset has many causes: a load, friction that differs by direction, a zero of the drive. One above friction
     moves the axis: it is left to a diagnosis.
     """
-    if plant.offset.significant and plant.one_way is None and abs(plant.offset.value) < plant.coulomb.value:
+    if plant.offset_held:
         (name,) = (parameter.name for parameter in constant_load.MECHANISM.parameters)
         held = "below friction: a load, friction that differs by direction, or a zero of the drive"
         draft.mechanisms[constant_load.MECHANISM.id] = [_value(name, plant.offset, "at the motor", held)]

@@ -41,6 +41,12 @@ class PlantValues:
     spring: Estimate | None
     one_way: Estimate | None = None
 
+    @property
+    def offset_held(self) -> bool:
+        """True for a constant torque that friction holds; one above it moves the axis."""
+        told = self.offset.significant and self.one_way is None
+        return told and abs(self.offset.value) < self.coulomb.value
+
 
 @dataclass(frozen=True)
 class TransmissionValues:

@@ -47,8 +47,9 @@ def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
         steps = np.diff(np.flatnonzero(~missing))
         if steps.size > 10 and steps.min() > 1 and np.ptp(steps) <= 1:
             raise InputError(
-                f"{table.path}: {name} has a number only in every {round(float(np.median(steps)))}th row: two rates in "
-                "one file; export one rate, or leave the column out by a map"
+                f"{table.path}: {name} has a number in one row of {round(float(np.median(steps)))} only: two rates in "
+                "one file; if it has a time column of its own, write time: {column: NAME, unit: s} to its channel in a "
+                "map; else export one rate, or leave the column out by a map"
             )
         first = int(np.argmax(missing))
         after = " and never after" if 0 < first == np.sum(~missing) else ""

@@ -194,10 +194,11 @@ def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place
         problem = f"runs back by {-np.median(falls):.6g} s in {back} places"
         advice = "if it is a counter that starts again, write its range into a map: time.wraps_at"
     elif back > max(3, time_s.size // 100):
-        problem, advice = f"runs back in {back} places, the rows are out of order", "sort the file by its time"
+        problem = f"runs back in {back} places, the rows are out of order or the clock was set"
+        advice = "sort rows that were shuffled by their time; where the clock was set the times are lost: record again"
     else:
         problem = "runs back"
-        advice = "two recordings in one file, or rows out of order: cut the file there, or sort it"
+        advice = "two recordings in one file, or a clock that was set: cut the file there"
     raise InputError(
         f"{place(row)}: time_s: {problem}: given {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s, "
         f"allowed a growing time; {advice}"

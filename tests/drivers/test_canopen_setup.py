@@ -90,6 +90,15 @@ def test_a_rated_torque_may_differ_by_its_rounding(share: float) -> None:
     assert rig.drive.info.rated_torque_n_m == 4.0
 
 
+@pytest.mark.parametrize("key", [0x608F_01, 0x6075_00, 0x6076_00])
+def test_a_drive_without_resolution_rated_current_or_torque_is_refused(key: int) -> None:
+    rig = in_process()
+    rig.node.values[key] = 0
+    with pytest.raises(ConfigurationError, match=r"objects 0x608F, 0x6076, 0x6075: .*must be positive; given: .*\b0\.0 "):
+        rig.set_up()
+    assert rig.node.state is DriveState.SWITCH_ON_DISABLED
+
+
 # -- an independent SDO server ----------------------------------------------------------------------------------------
 
 

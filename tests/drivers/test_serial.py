@@ -167,6 +167,14 @@ def test_positions_arrive_with_their_time(line: Line) -> None:
     assert line.reader.lost_frames == 0
 
 
+@pytest.mark.parametrize(("read_out", "counts"), [(b"1.2 um\n", 2), (b"1.3 um\n", 3), (b"-1.3 um\n", -3)])
+def test_the_counts_of_a_read_out_are_the_nearest(read_out: bytes, counts: int) -> None:
+    line = Line(SerialFormat.ASCII)  # a count is 0.5 um
+    line.put(b"\n" + read_out)
+    assert line.read(0.0).counts == counts
+    line.close()
+
+
 def test_reading_never_waits_and_an_old_position_says_so(line: Line) -> None:
     line.send(0.0)
     line.read(0.0)

@@ -94,7 +94,7 @@ def test_a_rated_torque_may_differ_by_its_rounding(share: float) -> None:
 def test_a_drive_without_resolution_rated_current_or_torque_is_refused(key: int) -> None:
     rig = in_process()
     rig.node.values[key] = 0
-    with pytest.raises(ConfigurationError, match=r"objects 0x608F, 0x6076, 0x6075: .*must be positive; given: .*\b0\.0 "):
+    with pytest.raises(ConfigurationError, match=r"0x608F, 0x6076, 0x6075: .* must be positive; given: .*\b0\.0 "):
         rig.set_up()
     assert rig.node.state is DriveState.SWITCH_ON_DISABLED
 

@@ -119,6 +119,10 @@ def test_status_and_elapsed_time_of_a_frame(elapsed_us: int, told: int | None, s
     assert reading == (-7, None, 255, status == 0, told)
 
 
+def test_a_frame_says_nothing_of_elapsed_time_or_an_alarm_by_itself() -> None:
+    assert BinaryParser().feed(encode_frame(-7, 255)) == [(-7, None, 255, True, None)]
+
+
 # -- on a pseudo-terminal ---------------------------------------------------------------------------------------------
 
 

@@ -53,6 +53,13 @@ def test_a_changed_byte_is_never_a_position_and_the_next_frame_is_found(counts: 
     assert [r.counts for r in readings] == [42, 43]
 
 
+def test_a_wrong_checksum_is_one_error() -> None:
+    parser = BinaryParser()
+    wrong = encode_frame(41, 7)[:-1] + bytes([encode_frame(41, 7)[-1] ^ 1])
+    assert [r.counts for r in parser.feed(wrong + encode_frame(42, 8))] == [42]
+    assert (parser.errors, parser.discarded_bytes) == (1, 16)
+
+
 @given(st.integers(1, 15), COUNTS)
 def test_a_cut_frame_costs_itself_only(length: int, counts: int) -> None:
     parser = BinaryParser()

@@ -191,6 +191,17 @@ def test_a_pdo_is_invalid_while_it_is_mapped_and_valid_afterwards(communication:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("held", [0, 1, 3])
+def test_a_pdo_with_fewer_or_more_entries_than_wanted_is_mapped_again(held: int) -> None:
+    rig = in_process()
+    rig.node.values[0x1A00_00] = held
+    for k, entry in enumerate(FEEDBACK, start=1):
+        rig.node.values[0x1A00_00 + k] = entry.word
+    with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        device.map_pdo(0x1800, FEEDBACK[:2], 1, 0x185)
+    assert rig.node.values[0x1A00_00] == 2
+
+
 @pytest.fixture
 def many_pdos(tmp_path: Path) -> Path:
     """EDS of a drive with PDOs at the ends of their ranges."""

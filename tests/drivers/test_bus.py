@@ -98,6 +98,12 @@ def test_an_in_process_port_is_a_python_can_bus_where_one_is_wanted() -> None:
     assert (message.arbitration_id, bytes(message.data), message.timestamp) == (0x322, b"\x06", 4.0)
     assert foreign_kind(message) == ""
     assert as_bus.recv(0) is None
+    as_bus.set_filters([{"can_id": 0x324, "can_mask": 0x7FF}])
+    for can_id in (0x323, 0x324):
+        port.send(can_id, b"", 5.0)
+    filtered = as_bus.recv(0.1)
+    assert filtered is not None
+    assert filtered.arbitration_id == 0x324
     as_bus.shutdown()
 
 

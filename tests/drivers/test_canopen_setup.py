@@ -9,7 +9,7 @@ from pathlib import Path
 
 import canopen
 import pytest
-from drive_rig import Mass, Rig, in_process
+from drive_rig import Mass, Rig, in_process, servo
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
@@ -88,6 +88,36 @@ def test_a_rated_torque_may_differ_by_its_rounding(share: float) -> None:
     rig = in_process(settings=DriveSettings(rated_torque_n_m=4.0 * share))
     rig.set_up()
     assert rig.drive.info.rated_torque_n_m == 4.0
+
+
+def test_limit_deadline_and_error_code_are_those_of_the_drive() -> None:
+    rig = in_process(settings=DriveSettings(max_torque_n_m=6.0))
+    rig.set_up()
+    assert rig.node.values[0x6072_00] == 1500  # 1/1000 of 4 N m
+    assert rig.drive.info.max_torque_n_m == pytest.approx(6.0)
+    assert rig.node.values[0x1400_05] == 50  # ms
+    assert rig.drive.error_code == 0
+
+
+@pytest.mark.parametrize("speed_rad_s", [5.0, -5.0])
+def test_a_drive_turns_either_way_at_a_velocity(speed_rad_s: float) -> None:
+    rig = in_process(servo=servo(), settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_VELOCITY))
+    rig.set_up()
+    rig.enable()
+    for _ in range(200):
+        rig.cycle(speed_rad_s)
+    assert rig.plant.velocity_rad_s == pytest.approx(speed_rad_s, rel=0.02)
+
+
+def test_an_interpolation_time_has_255_units_at_most() -> None:
+    rig = in_process()
+    with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        device.set_interpolation_time(0.0255)
+        assert (rig.node.values[0x60C2_01], rig.node.values[0x60C2_02]) == (255, -4)
+        with pytest.raises(
+            ConfigurationError, match=r"period cannot be expressed; given: 0\.0257 s; allowed: 1\.\.255"
+        ):
+            device.set_interpolation_time(0.0257)
 
 
 @pytest.mark.parametrize("key", [0x608F_01, 0x6075_00, 0x6076_00])

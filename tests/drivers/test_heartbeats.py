@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,11 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.bus import CanPort
+from drivers.canopen_drive import DriveSettings
 from drivers.canopen_master import NMT_PRE_OPERATIONAL, NMT_START, NMT_STOP, CanopenMaster
 from drivers.cia402 import DriveState
+from drivers.heartbeat_trial import watches_master
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition, DriveGoal
+from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 MASTER, DRIVE, NMT, EMCY = 0x701, 0x705, 0x000, 0x085
 PERIOD_S = 0.001
@@ -187,6 +191,14 @@ def test_another_emergency_is_no_report(code: int) -> None:
         rig.node._on_heartbeat = lambda can_id, data, now_s: rig.node.emergency(code, 0x09, now_s)
 
     assert not tried(trips).drive.info.watches_master
+
+
+def test_a_consumer_without_an_entry_is_not_tried(tmp_path: Path) -> None:
+    text = (EDS_FOLDER / "servo_drive.eds").read_text()
+    (tmp_path / "drive.eds").write_text(text[: text.index("[1016sub1]")] + text[text.index("[1017]") :])
+    rig = in_process(settings=DriveSettings(eds=tmp_path / "drive.eds"))
+    with DeviceSetup(rig.master.network, 5, tmp_path / "drive.eds") as device:
+        assert watches_master(device, rig.master) is None
 
 
 def test_a_report_is_waited_for_a_fifth_of_a_second() -> None:

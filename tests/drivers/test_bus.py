@@ -318,6 +318,22 @@ def test_errors_drive_a_controller_passive_then_off_and_recovery_brings_it_back(
     assert seen[before:][-1][1] == b"\xff"
 
 
+def test_the_limits_of_a_controller_are_those_of_iso_11898() -> None:
+    """Eight per error, one less per success: passive above 127, off above 255, and from zero on after a recovery."""
+    port = ModelledBus().port()
+    for _ in range(2):
+        states = []
+        for _ in range(32):
+            port.failed()
+            states.append(port.health.state)
+        assert states == [BusState.ACTIVE] * 15 + [BusState.PASSIVE] * 16 + [BusState.OFF]
+        port.recover()
+    for _ in range(16):
+        port.failed()
+    port.sent()
+    assert port.health.state is BusState.ACTIVE
+
+
 def test_the_modelled_bus_is_deterministic() -> None:
     def run() -> Seen:
         bus = ModelledBus(250_000)

@@ -71,6 +71,19 @@ def test_set_points_older_than_the_cycles_do_not_count() -> None:
     assert acting.text == "the set-point -500 acts, commanded were 0 to 500"
 
 
+@pytest.mark.parametrize("mode", [CST, CSV, CSP])
+def test_a_demand_is_told_with_its_sign(mode: OperationMode) -> None:
+    acting = watch(mode, [1000])
+    assert acting.differs(frame(mode, -9000))
+    assert acting.text == "the set-point -9000 acts, commanded were 1000 to 1000"
+
+
+@pytest.mark.parametrize("mode", [CSV, CSP])
+def test_a_coarse_encoder_may_round_by_two_counts(mode: OperationMode) -> None:
+    assert [watch(mode, [0], counts_per_rev=100.0).differs(frame(mode, demand)) for demand in (-2, 2)] == [False] * 2
+    assert [watch(mode, [0], counts_per_rev=100.0).differs(frame(mode, demand)) for demand in (-3, 3)] == [True] * 2
+
+
 def test_the_last_of_the_cycles_allowed_counts_and_no_older_one() -> None:
     _, rig = running()
     cycles = rig.drive.settings.missed_answers_allowed + 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from copy import deepcopy
 from itertools import pairwise
@@ -9,8 +10,9 @@ from itertools import pairwise
 import can
 import pytest
 
-from drivers.bus import BusConfig, BusState, CanPort, DataFrame, PumpedPort, PythonCanPort, open_bus
+from drivers.bus import BusConfig, BusState, CanPort, DataFrame, PumpedPort, PythonCanPort, foreign_kind, open_bus
 from drivers.inprocess import AsBusABC, InProcessBus
+from drivers.loopback_bus import DamagedData
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus, frame_bits
 from drivers.port import BusError
 
@@ -94,7 +96,27 @@ def test_an_in_process_port_is_a_python_can_bus_where_one_is_wanted() -> None:
     message = as_bus.recv(0)
     assert message is not None
     assert (message.arbitration_id, bytes(message.data), message.timestamp) == (0x322, b"\x06", 4.0)
+    assert foreign_kind(message) == ""
     assert as_bus.recv(0) is None
+    as_bus.set_filters([{"can_id": 0x324, "can_mask": 0x7FF}])
+    for can_id in (0x323, 0x324):
+        port.send(can_id, b"", 5.0)
+    filtered = as_bus.recv(0.1)
+    assert filtered is not None
+    assert filtered.arbitration_id == 0x324
+    as_bus.shutdown()
+
+
+def test_a_frame_that_arrives_while_somebody_waits_for_one_is_taken() -> None:
+    """On a modelled bus nothing arrives until the next look at the time."""
+    bus, times = ModelledBus(1_000_000), iter([0.0, 1.0])
+    as_bus = AsBusABC(bus.port(), lambda: next(times))
+    bus.port().send(0x321, b"", 0.0)
+    began_s = time.monotonic()
+    message = as_bus.recv(None)
+    assert message is not None
+    assert message.arbitration_id == 0x321
+    assert time.monotonic() - began_s < 1.0  # it looks every 5 ms
     as_bus.shutdown()
 
 
@@ -150,6 +172,9 @@ def test_an_error_frame_without_its_detail_changes_no_state(data: bytes) -> None
     [
         ([error_frame(0x080)], BusState.ACTIVE),
         ([error_frame(0x004, 0x20)], BusState.PASSIVE),
+        ([error_frame(0x004, 0x10)], BusState.PASSIVE),
+        ([error_frame(0x004, 0x01)], BusState.ACTIVE),  # overflow of a buffer, and warnings
+        ([error_frame(0x004, 0x0E)], BusState.ACTIVE),
         ([error_frame(0x004, 0x10), error_frame(0x004, 0x40)], BusState.ACTIVE),
         ([error_frame(0x040)], BusState.OFF),
         ([error_frame(0x040), error_frame(0x100)], BusState.ACTIVE),
@@ -162,6 +187,25 @@ def test_error_frames_are_visible(frames: list[can.Message], state: BusState) ->
     assert port.health.state is state
     assert port.health.error_frames == count
     assert port.health.last_error
+
+
+def test_what_follows_damaged_data_is_heard_at_the_same_poll() -> None:
+    class Damaged(ErrorSource):
+        """Its first data is no frame."""
+
+        damaged = True
+
+        def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+            if self.damaged:
+                self.damaged = False
+                raise DamagedData
+            return super()._recv_internal(timeout)
+
+    port = PythonCanPort(Damaged([can.Message(arbitration_id=0x185, is_extended_id=False)]))
+    seen = record(port, 0x185)
+    port.poll(0.0)
+    assert len(seen) == 1
+    assert port.health.foreign == {"no CAN frame": 1}
 
 
 def test_a_frame_that_cannot_be_sent_is_counted_and_does_not_stop_the_loop() -> None:
@@ -218,6 +262,7 @@ def test_load_is_bits_over_time() -> None:
     assert bus.load() == pytest.approx(100 * (frame_bits(0) + frame_bits(4)) * 1e-6 / 0.1)
     a.poll(0.2)
     assert bus.load() == 0.0
+    assert bus.load() == 0.0  # over no time
 
 
 @pytest.mark.parametrize(
@@ -271,6 +316,22 @@ def test_errors_drive_a_controller_passive_then_off_and_recovery_brings_it_back(
     b.poll(1.1)
     assert a.health.state is BusState.ACTIVE
     assert seen[before:][-1][1] == b"\xff"
+
+
+def test_the_limits_of_a_controller_are_those_of_iso_11898() -> None:
+    """Eight per error, one less per success: passive above 127, off above 255, and from zero on after a recovery."""
+    port = ModelledBus().port()
+    for _ in range(2):
+        states = []
+        for _ in range(32):
+            port.failed()
+            states.append(port.health.state)
+        assert states == [BusState.ACTIVE] * 15 + [BusState.PASSIVE] * 16 + [BusState.OFF]
+        port.recover()
+    for _ in range(16):
+        port.failed()
+    port.sent()
+    assert port.health.state is BusState.ACTIVE
 
 
 def test_the_modelled_bus_is_deterministic() -> None:

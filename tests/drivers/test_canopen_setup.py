@@ -9,7 +9,7 @@ from pathlib import Path
 
 import canopen
 import pytest
-from drive_rig import Mass, Rig, in_process
+from drive_rig import Mass, Rig, in_process, servo
 
 from drivers.bus import BusConfig, PythonCanPort, open_bus
 from drivers.canopen_drive import CanopenDrive, DriveSettings
@@ -88,6 +88,45 @@ def test_a_rated_torque_may_differ_by_its_rounding(share: float) -> None:
     rig = in_process(settings=DriveSettings(rated_torque_n_m=4.0 * share))
     rig.set_up()
     assert rig.drive.info.rated_torque_n_m == 4.0
+
+
+def test_limit_deadline_and_error_code_are_those_of_the_drive() -> None:
+    rig = in_process(settings=DriveSettings(max_torque_n_m=6.0))
+    rig.set_up()
+    assert rig.node.values[0x6072_00] == 1500  # 1/1000 of 4 N m
+    assert rig.drive.info.max_torque_n_m == pytest.approx(6.0)
+    assert rig.node.values[0x1400_05] == 50  # ms
+    assert rig.drive.error_code == 0
+
+
+@pytest.mark.parametrize("speed_rad_s", [5.0, -5.0])
+def test_a_drive_turns_either_way_at_a_velocity(speed_rad_s: float) -> None:
+    rig = in_process(servo=servo(), settings=DriveSettings(mode=OperationMode.CYCLIC_SYNC_VELOCITY))
+    rig.set_up()
+    rig.enable()
+    for _ in range(200):
+        rig.cycle(speed_rad_s)
+    assert rig.plant.velocity_rad_s == pytest.approx(speed_rad_s, rel=0.02)
+
+
+def test_an_interpolation_time_has_255_units_at_most() -> None:
+    rig = in_process()
+    with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        device.set_interpolation_time(0.0255)
+        assert (rig.node.values[0x60C2_01], rig.node.values[0x60C2_02]) == (255, -4)
+        with pytest.raises(
+            ConfigurationError, match=r"period cannot be expressed; given: 0\.0257 s; allowed: 1\.\.255"
+        ):
+            device.set_interpolation_time(0.0257)
+
+
+@pytest.mark.parametrize("key", [0x608F_01, 0x6075_00, 0x6076_00])
+def test_a_drive_without_resolution_rated_current_or_torque_is_refused(key: int) -> None:
+    rig = in_process()
+    rig.node.values[key] = 0
+    with pytest.raises(ConfigurationError, match=r"0x608F, 0x6076, 0x6075: .* must be positive; given: .*\b0\.0 "):
+        rig.set_up()
+    assert rig.node.state is DriveState.SWITCH_ON_DISABLED
 
 
 # -- an independent SDO server ----------------------------------------------------------------------------------------
@@ -180,6 +219,17 @@ def test_a_pdo_is_invalid_while_it_is_mapped_and_valid_afterwards(communication:
         (communication, 1, cob_id | flags | 1 << 31), (mapping, 0, 0), (mapping, 1, entry.word), (mapping, 0, 1),
         (communication, 2, 1), (communication, 1, cob_id | flags),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("held", [0, 1, 3])
+def test_a_pdo_with_fewer_or_more_entries_than_wanted_is_mapped_again(held: int) -> None:
+    rig = in_process()
+    rig.node.values[0x1A00_00] = held
+    for k, entry in enumerate(FEEDBACK, start=1):
+        rig.node.values[0x1A00_00 + k] = entry.word
+    with DeviceSetup(rig.master.network, 5, EDS_FOLDER / "servo_drive.eds") as device:
+        device.map_pdo(0x1800, FEEDBACK[:2], 1, 0x185)
+    assert rig.node.values[0x1A00_00] == 2
 
 
 @pytest.fixture

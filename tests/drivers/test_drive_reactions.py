@@ -15,7 +15,7 @@ from drivers.fault_reset import reset_fault
 from drivers.inprocess import InProcessBus
 from drivers.port import Condition, ConfigurationError
 from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
-from drivers.sim.sdo_server import AbortCode, SdoAbort
+from drivers.sim.sdo_server import AbortCode, SdoAbort, SdoServer
 
 CST, CSP = OperationMode.CYCLIC_SYNC_TORQUE, OperationMode.CYCLIC_SYNC_POSITION
 CONSUMER, DEADLINE = 0x1016_01, 0x1400_05
@@ -141,9 +141,11 @@ def test_sync_is_made_that_of_the_master(rig: Rig, device: DeviceSetup, sync: in
 
 
 def test_a_sync_that_is_right_is_not_written(rig: Rig, device: DeviceSetup) -> None:
-    keep(rig, 0x1005_00, 0x8000_0080)  # bit 31 has no meaning
+    written: list[int] = []
+    rig.node.dictionary.on_write(0x1005, lambda index, subindex, wanted: written.append(wanted))
+    rig.node.values[0x1005_00] = 0x8000_0080  # bit 31 has no meaning
     write_timing(device, 0.001, CST)
-    assert device.kept == []
+    assert written == device.kept == []
 
 
 @pytest.mark.parametrize(
@@ -163,6 +165,27 @@ def test_an_interpolation_time_that_the_drive_keeps(
         with pytest.raises(ConfigurationError, match="0x60C2"):
             write_timing(device, 0.001, CSP)
     else:
+        write_timing(device, 0.001, CSP)
+
+
+@pytest.mark.parametrize("hidden", [1, 2])
+def test_an_interpolation_time_of_which_a_part_cannot_be_read_is_named(
+    rig: Rig, device: DeviceSetup, hidden: int
+) -> None:
+    def read(index: int, subindex: int) -> bytes:
+        if (index, subindex) == (0x60C2, hidden):
+            raise SdoAbort(AbortCode.WRITE_ONLY)
+        return rig.node.dictionary.read(index, subindex)
+
+    def write(index: int, subindex: int, data: bytes) -> None:
+        if index == 0x60C2:
+            raise SdoAbort(AbortCode.READ_ONLY)
+        rig.node.dictionary.write(index, subindex, data)
+
+    rig.node._sdo = SdoServer(read, write)
+    write_timing(device, 0.001, CST)
+    assert [text.split(" (")[0] for text in device.kept] == ["0x60C2"]
+    with pytest.raises(ConfigurationError, match="0x60C2"):
         write_timing(device, 0.001, CSP)
 
 

@@ -140,6 +140,12 @@ def test_numbers_in_every_form(value: int, zeros: int) -> None:
         assert node_formula(f"$NODEID+0x{value:X}") == node_formula(f"{value} + $NodeId;x") == value
 
 
+@pytest.mark.parametrize(("text", "offset"), [
+    ("$NODEID", 0), ('"$nodeid" ; alone', 0), ("$NODEID+", 0), ("0x180", None), ("$NODEID+abc", None)])  # fmt: skip
+def test_the_node_id_alone_is_a_formula(text: str, offset: int | None) -> None:
+    assert node_formula(text) == offset
+
+
 @pytest.mark.parametrize("text", ["", "abc", "0x", "0xG", "1e5", "1.5", "--1", "1 2x", "$NODEID+1", "٣", "9" * 30])
 def test_what_is_no_number(text: str) -> None:
     assert number(text) is None

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 from canopen.objectdictionary.datatypes import (
+    DOMAIN,
     INTEGER16,
     INTEGER32,
+    UNSIGNED8,
     UNSIGNED16,
     UNSIGNED32,
     UNSIGNED64,
@@ -68,6 +70,15 @@ def test_every_sign_is_that_of_the_profile(tmp_path: Path) -> None:
 ])  # fmt: skip
 def test_the_sign_of_a_known_object_is_fixed_and_its_length_kept(index: int, data_type: int, read_as: int) -> None:
     assert profile_type(index, 0, data_type) == read_as
+
+
+@pytest.mark.parametrize(("section", "subindex", "read_as"), [("1018sub0", 0, UNSIGNED8), ("1018sub1", 1, DOMAIN)])
+def test_an_entry_without_type_is_bytes_but_for_the_number_of_entries(
+    tmp_path: Path, section: str, subindex: int, read_as: int
+) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(retyped(DRIVE, section, "DataType="))
+    assert read_eds(path, 5).dictionary[0x1018][subindex].data_type == read_as
 
 
 def test_another_sign_is_said_with_its_line(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from drive_rig import running
+from drive_rig import in_process, running
 
 from drivers.bus import BusState
 from drivers.cia402 import DriveState
@@ -68,6 +68,15 @@ def test_short_rpdo_is_answered_by_emcy_8210_and_not_obeyed() -> None:
     assert sample.torque_n_m == 1.0
     assert rig.drive.emergencies[-1].text.startswith("EMCY 0x8210 PDO not processed due to length error")
     assert sample.condition & Condition.EMERGENCY
+
+
+def test_emergencies_without_end_do_not_fill_the_memory_and_the_last_one_is_kept() -> None:
+    rig = in_process()
+    rig.set_up()
+    for code in range(0xFF00, 0xFF00 + 250):
+        rig.node.emergency(code, 0x81, rig.now_s)
+    assert 10 <= len(rig.drive.emergencies) < 200
+    assert rig.drive.emergencies[-1].code == 0xFFF9
 
 
 def test_late_answer_is_used_by_the_next_cycle() -> None:

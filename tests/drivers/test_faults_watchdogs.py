@@ -58,6 +58,12 @@ def test_the_drive_s_watchdogs_run_out_during_a_stall_and_not_after_it() -> None
     assert travelled_rad[0] == pytest.approx(travelled_rad[1], rel=0.03)  # a period of about 60 until rest
 
 
+def test_an_answer_is_as_old_as_syncs_were_sent_after_its_own() -> None:
+    bus, rig = running()
+    bus.inject(Fault(FaultKind.DROP, 0x185, count=3))
+    assert [rig.cycle(0.0).age_cycles for _ in range(4)] == [1, 2, 3, 0]
+
+
 @pytest.mark.parametrize("node_id", [5, 6])
 def test_a_heartbeat_that_is_never_heard_is_missed_as_one_that_is_lost(node_id: int) -> None:
     """Drive (5) and encoder (6) were told to send it (0x1017): 60 ms after the first answer to a SYNC without it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,11 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.bus import CanPort
-from drivers.canopen_master import NMT_STOP, CanopenMaster
+from drivers.canopen_drive import DriveSettings
+from drivers.canopen_master import NMT_PRE_OPERATIONAL, NMT_START, NMT_STOP, CanopenMaster
 from drivers.cia402 import DriveState
+from drivers.heartbeat_trial import watches_master
 from drivers.inprocess import InProcessBus
 from drivers.modelled_bus import Fault, FaultKind, ModelledBus
 from drivers.port import Condition, DriveGoal
+from drivers.sdo_setup import EDS_FOLDER, DeviceSetup
 
 MASTER, DRIVE, NMT, EMCY = 0x701, 0x705, 0x000, 0x085
 PERIOD_S = 0.001
@@ -75,6 +79,16 @@ def test_heartbeats_that_a_late_loop_missed_are_not_sent_afterwards() -> None:
     for tick in (*range(1, 30), *range(500, 561)):
         master.sync(tick * PERIOD_S)
     assert [round(1e3 * now_s) for now_s, _ in beats] == [0, 20, 500, 520, 540, 560]
+
+
+def test_a_heartbeat_that_is_due_when_a_missed_one_is_sent_goes_with_it() -> None:
+    bus = InProcessBus()
+    master = CanopenMaster(bus.port(), heartbeat_s=0.25)
+    beats = heard(bus.port(), MASTER)
+    master.start(0.0)
+    for now_s in (0.5, 0.625, 0.75):
+        master.sync(now_s)
+    assert [now_s for now_s, _ in beats] == [0.0, 0.5, 0.75]
 
 
 def test_a_period_that_is_no_multiple_of_the_tick_is_kept_on_average() -> None:
@@ -169,11 +183,37 @@ def test_a_drive_that_watches_another_node_is_seen() -> None:
     assert not tried(listen_to_nobody).drive.info.watches_master
 
 
-def test_another_emergency_is_no_report() -> None:
-    def overheated(rig: Rig, bus: ModelledBus) -> None:
-        rig.node._on_heartbeat = lambda can_id, data, now_s: rig.node.emergency(0x4210, 0x09, now_s)
+@pytest.mark.parametrize("code", [0x4210, 0x80FF, 0x8210, 0x9000, 0xFF01])
+def test_another_emergency_is_no_report(code: int) -> None:
+    """0x81xx is communication (CiA 301); heat, a PDO of another length, the device's own are not."""
 
-    assert not tried(overheated).drive.info.watches_master
+    def trips(rig: Rig, bus: ModelledBus) -> None:
+        rig.node._on_heartbeat = lambda can_id, data, now_s: rig.node.emergency(code, 0x09, now_s)
+
+    assert not tried(trips).drive.info.watches_master
+
+
+def test_a_consumer_without_an_entry_is_not_tried(tmp_path: Path) -> None:
+    text = (EDS_FOLDER / "servo_drive.eds").read_text()
+    (tmp_path / "drive.eds").write_text(text[: text.index("[1016sub1]")] + text[text.index("[1017]") :])
+    rig = in_process(settings=DriveSettings(eds=tmp_path / "drive.eds"))
+    with DeviceSetup(rig.master.network, 5, tmp_path / "drive.eds") as device:
+        assert watches_master(device, rig.master) is None
+
+
+def test_a_report_is_waited_for_a_fifth_of_a_second() -> None:
+    commands: list[tuple[float, bytes]] = []
+
+    def deaf(rig: Rig, bus: ModelledBus) -> None:
+        bus.inject(Fault(FaultKind.DROP, MASTER, count=100))
+        rig.master.network.time_s = 0.5
+        bus.port().listen(NMT, lambda _, data, now_s: commands.append((now_s, data)))
+
+    tried(deaf)
+    began = next(k for k, (_, data) in enumerate(commands) if data == bytes([NMT_START, 5]))
+    (begin_s, _), (end_s, ended) = commands[began : began + 2]
+    assert ended == bytes([NMT_PRE_OPERATIONAL, 5])
+    assert end_s - begin_s == pytest.approx(0.2, abs=0.003)
 
 
 def test_a_drive_that_faults_whatever_its_option_is_reset() -> None:

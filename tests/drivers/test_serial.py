@@ -53,6 +53,13 @@ def test_a_changed_byte_is_never_a_position_and_the_next_frame_is_found(counts: 
     assert [r.counts for r in readings] == [42, 43]
 
 
+def test_a_wrong_checksum_is_one_error() -> None:
+    parser = BinaryParser()
+    wrong = encode_frame(41, 7)[:-1] + bytes([encode_frame(41, 7)[-1] ^ 1])
+    assert [r.counts for r in parser.feed(wrong + encode_frame(42, 8))] == [42]
+    assert (parser.errors, parser.discarded_bytes) == (1, 16)
+
+
 @given(st.integers(1, 15), COUNTS)
 def test_a_cut_frame_costs_itself_only(length: int, counts: int) -> None:
     parser = BinaryParser()
@@ -119,6 +126,10 @@ def test_status_and_elapsed_time_of_a_frame(elapsed_us: int, told: int | None, s
     assert reading == (-7, None, 255, status == 0, told)
 
 
+def test_a_frame_says_nothing_of_elapsed_time_or_an_alarm_by_itself() -> None:
+    assert BinaryParser().feed(encode_frame(-7, 255)) == [(-7, None, 255, True, None)]
+
+
 # -- on a pseudo-terminal ---------------------------------------------------------------------------------------------
 
 
@@ -165,6 +176,14 @@ def test_positions_arrive_with_their_time(line: Line) -> None:
         assert (sample.time_s, sample.age_cycles, sample.condition) == (k * 1e-3, 0, Condition.OK)
     line.reader.check()
     assert line.reader.lost_frames == 0
+
+
+@pytest.mark.parametrize(("read_out", "counts"), [(b"1.2 um\n", 2), (b"1.3 um\n", 3), (b"-1.3 um\n", -3)])
+def test_the_counts_of_a_read_out_are_the_nearest(read_out: bytes, counts: int) -> None:
+    line = Line(SerialFormat.ASCII)  # a count is 0.5 um
+    line.put(b"\n" + read_out)
+    assert line.read(0.0).counts == counts
+    line.close()
 
 
 def test_reading_never_waits_and_an_old_position_says_so(line: Line) -> None:

@@ -48,6 +48,11 @@ def test_a_loop_that_takes_over_a_weight_slows_the_rise() -> None:
     assert ACCELERATES in verdicts([10.0 + 0.5 * k for k in range(60)])  # at the torque limit
 
 
+@pytest.mark.parametrize(("share", "accelerates"), [(0.88, False), (0.92, True)])
+def test_a_rise_that_keeps_nine_tenths_of_itself_over_four_answers_is_unbroken(share: float, accelerates: bool) -> None:
+    assert (ACCELERATES in verdicts([10.0 + 50.0 * (1.0 - share ** (k / 4)) for k in range(60)])) is accelerates
+
+
 def test_a_speed_that_rose_and_falls_again_or_stays_is_a_transient() -> None:
     assert ACCELERATES not in verdicts([13.0 - 0.01 * k for k in range(50)])
     assert ACCELERATES not in verdicts([13.0 + 0.9 * 4 * COUNT * (k > 2) for k in range(50)])

@@ -88,6 +88,8 @@ MORE = {
     "two cores": (
         {"sys/devices/system/cpu/online": "2-3", "sys/devices/system/cpu/isolated": ""}, "isolated cores", "advice",
         "none"),
+    "interrupts of two cores": (
+        {"sys/devices/system/cpu/online": "2-3"}, "interrupts", "fine", "none of a device on core 3"),
     "isolated": ({}, "isolated cores", "fine", "3; the loop takes 3"),
     "siblings": (
         {"sys/devices/system/cpu/cpu3/topology/thread_siblings_list": "1-3,9"}, "hyper-threading", "advice",

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from hil.loop import clock as clock_module
-from hil.loop.clock import VirtualClock, WallClock
+from hil.loop.clock import LatenessLog, VirtualClock, WallClock
 
 
 def test_no_tick_comes_early_and_lateness_does_not_add_up() -> None:
@@ -70,3 +70,20 @@ def test_virtual_clock_is_always_on_time() -> None:
     assert [clock.wait(tick) for tick in (1, 2, 1_000_000)] == [0.0, 0.0, 0.0]
     assert clock.since(5) == 0.0
     assert not clock.may_wait(5, 10.0)
+
+
+def test_lateness_is_kept_in_memory_that_does_not_grow() -> None:
+    log = LatenessLog(5)
+    for late_s in (0.1, 0.2, 0.3):
+        log.add(late_s)
+    assert list(log.values) == [0.1, 0.2, 0.3]
+    log.begin()
+    assert list(log.values) == [0.3]
+    log.add(0.4)
+    log.begin(2)
+    assert list(log.values) == [0.4, 0.0, 0.0]
+    assert log.last_s == 0.0
+    for late_s in (0.5, 0.6, 0.7):
+        log.add(late_s)
+    assert list(log.values) == [0.4, 0.0, 0.0, 0.5, 0.6]
+    assert log.last_s == 0.7

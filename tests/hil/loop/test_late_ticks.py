@@ -68,6 +68,7 @@ def test_lateness_counts_from_the_first_tick_left_out() -> None:
             return {10: 0.0029, 13: 0.0006, 14: 0.0002}.get(tick, 0.0)
 
     assert next_due(Stalled(), 10, PERIOD_S, 0.0029) == (14, pytest.approx(0.0042), 4)
+    assert next_due(VirtualClock(), 2, PERIOD_S, 0.1008) == (103, pytest.approx(0.101), 101)
 
 
 @pytest.mark.parametrize("limit_s", [0.0, 0.001, 0.0075])

@@ -41,6 +41,10 @@ def test_bins_and_percentiles_hold_every_wake_up(counts: dict[float, int]) -> No
     assert one.largest_s == every[-1]
 
 
+def test_without_a_wake_up_no_latency_is_told() -> None:
+    assert (Latencies({}).total, Latencies({}).largest_s, Latencies({}).quantile(0.5)) == (0, 0.0, 0.0)
+
+
 def test_a_stall_misses_as_many_periods_as_it_lasts() -> None:
     assert Latencies({0.0032: 1, 1e-5: 999}).missed(0.001) == 3
     assert Latencies({0.0032: 1, 1e-5: 999}).missed(0.004) == 0

@@ -16,6 +16,8 @@ from faulty_bench import FaultyBench
 from drivers.cia402 import DriveState
 from drivers.port import Condition, DriveGoal
 from hil.errors import HilError
+from hil.loop.bounds import make_cycle
+from hil.loop.cycle import Samples
 from hil.loop.devices import Rig
 from hil.loop.session import Session
 from hil.loop.stall import stalled
@@ -272,6 +274,21 @@ def test_a_stall_is_kept_with_its_time_its_row_and_the_speed_of_the_set_points(t
     assert sessions[0]._stall == stalled(bench, 0.008, row, float(plan(MOVE, PERIOD_S, 0.0).velocity_m_s[row]))
     # a step of the twin more or less would be 0.1 mm; the drive holds its speed meanwhile
     assert np.abs(stored["table_position_m"].to_numpy() - stored["twin_table_position_m"].to_numpy()).max() < 5e-5
+
+
+def test_ticks_left_out_at_a_constant_speed_do_not_change_the_speed_that_is_fed_back() -> None:
+    """The motor's travel over eight periods is no travel of one."""
+    with Rig(bench_with()) as rig:
+        cycle = make_cycle(rig, 0.0)
+    sample = lambda tick, skipped: Samples(0.1 * tick, 0.0, 0.0, 4, 0, 0.0, 0.0, skipped=skipped)  # noqa: E731
+    for tick in range(1, 100):
+        cycle.step(tick, sample(tick, 0))
+    speed_m_s = cycle.velocity_m_s
+    assert speed_m_s == pytest.approx(0.1 / PERIOD_S * bench_with().gains.ratio_m_rad)
+    cycle.skip(100, 106, 0.1 * 107)
+    for tick in range(100, 110):
+        cycle.step(tick, sample(tick + 7, 7))
+        assert cycle.velocity_m_s == pytest.approx(speed_m_s)
 
 
 def test_a_bench_without_a_table_encoder_runs(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from hil.importing.units import unit_named
 _MOSTLY = 0.5  # share of the rows
 _MORE = 0.05  # share of the steps by which another column of words must let stamps go forwards to be one of the names
 _FEWEST = 3  # rows of a channel: with fewer the text is one of its row
+_MOST_COLUMNS = 100  # of rows of one value
 _FORWARDS = 0.9  # share of the steps of a channel's stamps: few are printed late
 
 
@@ -23,12 +24,16 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
     One column holds values that differ within a channel; columns of words name the channel: those that are needed so
     that its stamps go forwards. A single channel in the sample is one only if the header says so.
     """
+    if len(names) > _MOST_COLUMNS:
+        return None
     known = lexicon().series
     columns = {name: [row[index].strip() for row in rows] for index, name in enumerate(names)}
     numbers = [name for name, column in columns.items() if _most(column, lambda one: _number(one, form) is not None)]
     dates = [name for name, column in columns.items() if _most(column, is_date)]
-    times = dates or [name for name in numbers if label(name).quantity is Quantity.TIME] or numbers[:1]
     words = [name for name, column in columns.items() if name not in (*numbers, *dates) and any(column)]
+    if not words:
+        return None
+    times = dates or [name for name in numbers if label(name).quantity is Quantity.TIME] or numbers[:1]
     units = [name for name in words if _says(name, known.unit) or _most(columns[name], _is_unit)]
     units = [] if len(units) == len(words) else units  # channels whose names are units
     quality = [name for name in columns if _says(name, known.quality) and name not in (*times, *units)]

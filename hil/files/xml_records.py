@@ -42,7 +42,13 @@ def xml_columns(path: Path) -> tuple[dict[str, list[Any]], dict[str, str]]:
     twice = Counter(titles.values())
     names = {key: title if twice[title] == 1 else f"{title} {key}" for key, title in titles.items()}
     units = {names[key]: unit for key in keys if (unit := _first(about.get(key, {}), _UNITS))}
-    return {names[key]: [_value(one.get(key, "")) for one in rows] for key in keys}, units
+    columns = [[_value(one.get(key, "")) for one in rows] for key in keys]
+    if any(isinstance(value, str) for column in columns for value in column):  # texts of all tell their decimal mark
+        columns = [
+            [None if value is None else one[key] for value, one in zip(column, rows, strict=True)]
+            for key, column in zip(keys, columns, strict=True)
+        ]
+    return {names[key]: column for key, column in zip(keys, columns, strict=True)}, units
 
 
 def _tag(element: Element) -> str:
@@ -57,7 +63,7 @@ def _value(text: str) -> float | str | None:
     if not text:
         return None
     try:
-        value = float(text.replace(",", "."))
+        value = float(text)
     except ValueError:
         return text
     return None if value >= _WHOLE_NAN else value

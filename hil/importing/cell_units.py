@@ -84,7 +84,10 @@ def _part(field: str) -> _CellPart:
 
 @lru_cache(maxsize=1000)
 def _base(text: str) -> tuple[str, float] | None:
-    """Unit to which a unit in a cell is converted, and the factor; None for an unknown one, or M that may be mega."""
-    unit = unit_named(text)
+    """Unit to which a unit in a cell is converted, and the factor; None for an unknown one.
+
+    None also for M that may be mega, and for nm, which may be nanometres or N m.
+    """
+    unit = None if text == "nm" else unit_named(text)
     mega = text.startswith("M") and unit is not None and unit.startswith("m") and unit not in ("m", "min", "m/min")
     return None if unit is None or mega else base_of(unit)

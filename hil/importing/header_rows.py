@@ -166,8 +166,12 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
         return RowKind.UNKNOWN
     if all(re.sub(r"\d+$", "", one.lower()) in lexicon().types for one in named):
         return RowKind.TYPES
+    factors = [factor_and_unit(one) for one in named]
+    if any(found and not found[0] for found in factors):
+        return RowKind.UNKNOWN  # values with their units
     units = sum(
-        unit_of_text(one) is not None or one in ("-", "[-]", "[]") or factor_and_unit(one) is not None for one in named
+        unit_of_text(one) is not None or one in ("-", "[-]", "[]") or found is not None
+        for one, found in zip(named, factors, strict=True)
     )
     if all(_UNIT.fullmatch(one) for one in named) and units >= max(1, len(named) / 2):
         return RowKind.UNITS

@@ -217,6 +217,12 @@ class _Reader:
         last = int(complete[-1]) if complete.size and rows - complete[-1] <= _LONGEST else rows - 1
         kept = ~(wrong & ~told) & (np.arange(rows) <= last)
         lines = np.array(self.lines, dtype=np.int64)
+        end = lines[~kept & (np.arange(rows) > complete[-1])] if complete.size else lines[:0]
+        if end.size > _LONGEST:
+            raise InputError(
+                f"{self.path}:{end[0]}: no number as in the rows before, nor in {end.size - 1} more lines: "
+                f"{shown(line_of(self.path, int(end[0]), self.encoding))!r}; another form begins; import what is before"
+            )
         texts = {
             name: Cell(int(lines[first]), self.texts[name][first])
             for name in (*numbers, *dates)

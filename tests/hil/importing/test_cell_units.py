@@ -17,6 +17,7 @@ from hil.importing.cell_units import read_cells
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import map_text
 from hil.importing.number_form import NumberForm
+from hil.importing.records import read_records
 
 AXIS = axis(2400)
 T, ANGLE, SPEED, TORQUE = AXIS["t"], AXIS["angle"], AXIS["speed"], AXIS["torque"]
@@ -158,3 +159,38 @@ def test_a_cell_of_no_such_unit_is_named(tmp_path: Path, cell: str) -> None:
         draft_map(path)
     with pytest.raises(InputError, match=rf"log\.csv:901: torque: given '{cell}', allowed a number with its unit"):
         import_recording(path, map_path)
+
+
+@pytest.mark.parametrize("ending", ["xml", "json"])
+@pytest.mark.parametrize("begin", [20_000, 0])
+def test_texts_of_records_have_thousands(tmp_path: Path, ending: str, begin: int) -> None:
+    """20,000 um are 20 mm, also where every position has a mark between thousands."""
+    path, place = tmp_path / f"log.{ending}", begin + 1e4 * (ANGLE - ANGLE.min())
+    values = zip(T, place, TORQUE, strict=True)
+    rows = [{"t": f"{t:.3f}", "x_um": f"{x:,.0f}", "m_Nm": f"{m:.5f}"} for t, x, m in values]
+    lines = ["<r " + " ".join(f"{name}={text!r}" for name, text in row.items()) + "/>" for row in rows]
+    path.write_text(json.dumps(rows) if ending == "json" else f"<D>{''.join(lines)}</D>")
+    read = read_records(path).columns.lists
+    assert np.array(read["x_um"]) == pytest.approx(np.round(place))
+    assert np.array(read["m_Nm"]) == pytest.approx(np.round(TORQUE, 5))
+
+
+def test_a_first_row_of_values_with_units_is_no_row_of_factors(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    bare = [f"{line.rpartition(',')[0]},{m:.5f}" for line, m in zip(LINES[2:], TORQUE[1:], strict=True)]
+    path.write_text("\n".join(["t,angle,torque", LINES[1].replace(LINES[1].split(" ")[0], "0"), *bare]) + "\n")
+    assert not any(draft_map(path).table.scales.values())
+
+
+def test_rows_of_another_form_are_no_text_after_the_rows(tmp_path: Path) -> None:
+    path, half = tmp_path / "log.csv", T.size // 2
+    lines = [f"{t:.3f};{a:.6f};{m:.5f}" for t, a, m in zip(T, ANGLE, TORQUE, strict=True)]
+    path.write_text(
+        "\n".join(["t;angle;torque", *lines[:half], *(one.replace(".", ",") for one in lines[half:])]) + "\n"
+    )
+    with pytest.raises(InputError, match=rf"log\.csv:{half + 2}: "):
+        draft_map(path)
+
+
+def test_nm_in_a_cell_may_be_nanometres() -> None:
+    assert read_cells(["12345 nm", "12400 nm"], NumberForm()).unit == ""

@@ -133,11 +133,17 @@ def test_a_channel_that_pays_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("evidence", "more", "objection", "tied"),
-    [(9.9, 1.0, "", True), (500.0, 0.004, "", True), (10.0, 0.005, "", False), (-3.0, 0.0, "it is late", False)],
+    ("evidence", "more", "objection", "by_shape", "tied"),
+    [
+        (9.9, 1.0, "", False, True),
+        (500.0, 0.004, "", False, True),
+        (500.0, 0.004, "", True, False),
+        (10.0, 0.005, "", False, False),
+        (-3.0, 0.0, "it is late", False, False),
+    ],
 )
-def test_a_rival_is_tied_or_refuted(evidence: float, more: float, objection: str, tied: bool) -> None:
-    rival: Any = SimpleNamespace(evidence=evidence, more=more, objection=objection)
+def test_a_rival_is_tied_or_refuted(evidence: float, more: float, objection: str, by_shape: bool, tied: bool) -> None:
+    rival: Any = SimpleNamespace(evidence=evidence, more=more, objection=objection, by_shape=by_shape)
     assert accepted(examine(COMPARED, rival, CRITERIA)) is tied
 
 

@@ -89,6 +89,7 @@ class Asked:
 
 def test_signals_stop_the_axis_and_are_given_back() -> None:
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    given = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored under nohup
     before = {number: signal.getsignal(number) for number in numbers}
     session: Any = Asked()
     with _interruptible(session):
@@ -98,6 +99,7 @@ def test_signals_stop_the_axis_and_are_given_back() -> None:
     assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     signal.signal(signal.SIGHUP, before[signal.SIGHUP])
     assert {number: signal.getsignal(number) for number in numbers} == before
+    signal.signal(signal.SIGHUP, given)
 
 
 def test_a_hang_up_that_is_ignored_stays_so() -> None:

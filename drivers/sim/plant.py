@@ -6,6 +6,7 @@ from math import ceil, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.port import DriverError
 from drivers.sim.axis import GROUND, AxisTruth
 from drivers.sim.contact import lead_error
 from drivers.sim.effects import Effect, by_id
@@ -66,12 +67,19 @@ class Plant:
         self.torque_n_m = 0.0
 
     def advance(self, torque_command_n_m: float, period_s: float) -> None:
-        """Hold the command for one period, a whole multiple of step_s (else ValueError)."""
+        """Hold the command for one period, a whole multiple of step_s (else ValueError).
+
+        Raises DriverError for an axis whose position grows without bound.
+        """
         if period_s != self._period_s:
             self._steps, self._period_s = self.steps_in(period_s), period_s
         self.motor_position_rad, self.table_position_m, self.torque_n_m = advance_period(
             self.parameters, self.state, self.lines, torque_command_n_m, self._steps
         )
+        if not isfinite(self.motor_position_rad):
+            raise DriverError(
+                "the simulated axis is unstable: its position is no number; correct its parameters", where="simulation"
+            )
 
     def steps_in(self, period_s: float) -> int:
         """Return the internal steps in a period. Raises ValueError if that is no whole number."""

@@ -73,6 +73,9 @@ def read_table(path: Path) -> ForeignTable:
         raise InputError(f"{path}: the file is empty; give a file with rows of numbers")
     readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _records}
     read = readers[format_of(path)](path)
+    if "" in read.columns:
+        read.columns.pop("")
+        read = replace(read, remarks=(*read.remarks, "a column without a name is left out; give it one to use it"))
     table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(read.columns) > MOST_COLUMNS:

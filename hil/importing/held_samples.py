@@ -127,9 +127,9 @@ def _caught_up(
 
 def _new(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
     """Rows (n,) that differ from the row before in any column."""
-    rows = next(iter(columns.values())).size
+    rows = next(iter(columns.values()), np.zeros(0)).size
     new = np.zeros(rows, dtype=np.bool_)
-    new[0] = True
+    new[:1] = True
     for values in columns.values():
         new[1:] |= np.diff(values) != 0.0
     return new
@@ -137,7 +137,7 @@ def _new(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
 
 def _moving(columns: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
     """Rows (n,) at which a column moves by several of its steps per row in one direction."""
-    moving = np.zeros(next(iter(columns.values())).size, dtype=np.bool_)
+    moving = np.zeros(next(iter(columns.values()), np.zeros(0)).size, dtype=np.bool_)
     if moving.size <= 2 * _REACH:
         return moving
     for values in columns.values():

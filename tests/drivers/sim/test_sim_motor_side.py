@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from sim_tools import outer_force_n, plant_with
 
+from drivers.port import DriverError
 from drivers.sim.axis import two_mass
 from drivers.sim.effects import Effect
 
@@ -202,3 +203,10 @@ def test_friction_effects_combine() -> None:
     )
     torque = -outer_force_n(plant_with(AXIS, *effects), 5.0 * R, position_m=0.01) * R
     assert torque == pytest.approx((1.1 + 0.6 * np.exp(-1)) * 1.2 + 0.1 + 0.032, rel=1e-6)
+
+
+def test_an_axis_whose_position_is_no_number_is_said() -> None:
+    plant = plant_with(FRICTIONLESS)
+    plant.state["position"][...] = np.nan
+    with pytest.raises(DriverError, match="simulated axis: its position is no number"):
+        plant.advance(0.0, 1e-3)

@@ -194,3 +194,11 @@ def test_rows_of_another_form_are_no_text_after_the_rows(tmp_path: Path) -> None
 
 def test_nm_in_a_cell_may_be_nanometres() -> None:
     assert read_cells(["12345 nm", "12400 nm"], NumberForm()).unit == ""
+
+
+def test_a_column_without_a_name_is_left_out_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps({"": ANGLE.tolist(), "t": T.tolist(), "angle": ANGLE.tolist(), "m_Nm": TORQUE.tolist()}))
+    table = draft_map(path).table
+    assert "" not in table.columns
+    assert any("without a name" in remark for remark in table.remarks)

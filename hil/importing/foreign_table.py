@@ -75,7 +75,7 @@ def read_table(path: Path) -> ForeignTable:
     read = readers[format_of(path)](path)
     if "" in read.columns:
         read.columns.pop("")
-        read = replace(read, remarks=(*read.remarks, "a column without a name is left out; give it one to use it"))
+        read = replace(read, remarks=(*read.remarks, "(column without a name): give it one to use it"))
     table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(read.columns) > MOST_COLUMNS:

@@ -41,7 +41,7 @@ class ForeignTable:
     or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what lines above say
     of it, `titles` its text in the file where the column has another name. `scales` are factor and offset that the file
     gives for a column, `periods_s` the periods of its rows, `cell_units` the units of columns whose cells hold theirs.
-    `notes` say what is left out; `lines` (n,) are those of the rows.
+    `notes` tell the user what was left out or assumed; `lines` (n,) are the line numbers of the rows in the file.
     """
 
     path: Path
@@ -74,9 +74,8 @@ def read_table(path: Path) -> ForeignTable:
     readers = {".csv": _text, ".mat": _mat, ".parquet": _parquet, ".json": _records}
     read = readers[format_of(path)](path)
     if "" in read.columns:
-        read.columns.pop("")
         read = replace(read, remarks=(*read.remarks, "(column without a name): give it one to use it"))
-    table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items()}))
+    table = _equal_length(replace(read, columns={name: as_measured(one) for name, one in read.columns.items() if name}))
     rows = max((values.size for values in table.columns.values()), default=0)
     if len(read.columns) > MOST_COLUMNS:
         raise InputError(
@@ -183,20 +182,25 @@ def _mat(path: Path) -> ForeignTable:
             f"{path}: holds no vector of numbers (there are {listed(others) or 'no variables'}), allowed a vector "
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    units = stated.units_of(columns) | units
-    constants = stated.constants((), columns, units)
-    return ForeignTable(path, columns, units, stated.numbers, constants=constants, remarks=tuple(remarks))
+    return _with_stated(ForeignTable(path, columns, units, remarks=tuple(remarks)), stated)
+
+
+def _with_stated(table: ForeignTable, stated: Stated) -> ForeignTable:
+    """The table with the units and constants that its file states by name; a unit of a column itself counts first."""
+    units = stated.units_of(table.columns) | table.units
+    constants = stated.constants((), table.columns, units)
+    return replace(table, units=units, scalars=stated.numbers, constants=constants)
 
 
 def _parquet(path: Path) -> ForeignTable:
     schema = parquet_schema(path)
     wanted = [one.name for one in schema if is_number(one.type) or pa.types.is_timestamp(one.type)]
-    table = read_parquet(path, wanted)
+    stored_columns = read_parquet(path, wanted)
     columns, units, remarks = {}, {}, []
     dates = set[str]()
     for one in schema:
         if is_number(one.type):
-            columns[one.name] = numbers(path, table, one.name)
+            columns[one.name] = numbers(path, stored_columns, one.name)
             unit = stored_unit(schema, one.name)
             if unit:
                 units[one.name] = unit
@@ -208,16 +212,8 @@ def _parquet(path: Path) -> ForeignTable:
     stored = stored_values(schema)
     texts = {name: value for name, value in stored.items() if isinstance(value, str)}
     stated = Stated({name: value for name, value in stored.items() if not isinstance(value, str)}, texts)
-    units = stated.units_of(columns) | units
-    return ForeignTable(
-        path,
-        columns,
-        units,
-        stated.numbers,
-        constants=stated.constants((), columns, units),
-        remarks=tuple(remarks),
-        dates=frozenset(dates),
-    )
+    table = ForeignTable(path, columns, units, remarks=tuple(remarks), dates=frozenset(dates))
+    return _with_stated(table, stated)
 
 
 def _records(path: Path) -> ForeignTable:
@@ -234,20 +230,17 @@ def _records(path: Path) -> ForeignTable:
         else:
             other = next(value for value in values if isinstance(value, str | bool | list | dict))
             remarks.append(f"{name}: values such as {other!r}, no numbers")
-    stated = Stated(content.scalars, content.texts)
-    units = stated.units_of(columns) | content.units
-    return ForeignTable(
+    table = ForeignTable(
         path,
         columns,
-        units,
-        stated.numbers,
-        constants=stated.constants((), columns, units),
+        content.units,
         remarks=tuple(remarks),
         dates=frozenset(dates),
         texts=records.texts,
         notes=records.notes,
         cell_units=records.cell_units,
     )
+    return _with_stated(table, Stated(content.scalars, content.texts))
 
 
 def _equal_length(table: ForeignTable) -> ForeignTable:

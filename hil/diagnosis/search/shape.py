@@ -10,7 +10,7 @@ Least squares on the rows that slide: `c / error` is Student's t, with an error 
 many degrees of freedom as independent rows. Thousands of rows together tell what hides in the noise of each one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -37,7 +37,7 @@ from hil.twin.parameter import Role
 
 _FEWEST_ROWS = 100
 _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
-_FAINT = 0.1  # of the strength of a friction
+_FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
@@ -84,9 +84,9 @@ def _faint(fit: Fit, without: Fit) -> Hypothesis:
 
 
 class _Seen(NamedTuple):
-    """What a fit leaves of a channel on the rows (m,) that slide: measured, and of the smoothed motion.
+    """Residuals (m,) of a channel on the rows that slide: of the recordings, and of their smoothed motion (`quiet`).
 
-    `beside` (m, q): what other parameters make. `least` is the energy of a shape that counts.
+    `beside` (m, q) has the columns of least squares beside a shape; a shape of less energy than `least` does not count.
     """
 
     rows: list[NDArray[np.bool_]]
@@ -97,7 +97,7 @@ class _Seen(NamedTuple):
 
 
 class _Asked(NamedTuple):
-    """The channels of a fit that a shape may be in, the plain model, and its recordings without noise."""
+    """Channels of a fit in which a shape is sought, the plain model, and the recordings with smoothed motion."""
 
     channels: dict[str, _Seen]
     plain: PlainModel
@@ -106,44 +106,40 @@ class _Asked(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _asked(without: Fit) -> _Asked | None:
-    """What a fit leaves, for the shapes of all mechanisms; None where nothing slides."""
-    data, hypothesis = without.data, without.hypothesis
+    """Residuals of a fit, for the test of each mechanism's shape; None if the axis slides in no row."""
+    data, hypothesis, found = without.data, without.hypothesis, dict[str, _Seen]()
     plain = fit_plain(data)
     if plain is None:
         return None
     quiet = data.over([one.smooth for one in data.apart] or smoothed_runs(data.runs, plain))
-    moved = [measured_motion(run).moved for run in data.runs]
-    steps, found = without.estimator.steps(hypothesis), dict[str, _Seen]()
-    free = [
-        index
-        for index, one in enumerate(hypothesis.coordinates)
-        if index >= len(hypothesis.bench.axis.NOMINAL) and not one.edge
-    ]
     for channel in channels(data):
         parts = left_in_channel(hypothesis, data, channel, plain)
         rows = [one.rows for one in parts]
-
-        def at(x: FloatArray, rows: list[NDArray[np.bool_]] = rows, channel: str = channel) -> FloatArray:
-            return _joined(left_in_channel(hypothesis.moved(x), quiet, channel, plain), rows)
-
-        measured, own = _joined(parts, rows), at(hypothesis.x)
+        measured = _joined(parts, rows)
+        own = _joined(left_in_channel(hypothesis, quiet, channel, plain), rows)
         if measured.size < _FEWEST_ROWS or not (np.isfinite(measured).all() and np.isfinite(own).all()):
             continue
         beside = [np.ones_like(measured)]
         if channel == TORQUE:
-            columns = [plain_columns(one) for one in moved]
+            columns = [plain_columns(measured_motion(run).moved) for run in data.runs]
             beside += [
-                np.concatenate([one[name][at_] for one, at_ in zip(columns, rows, strict=True)]) for name in MOTION
+                np.concatenate([one[name][at] for one, at in zip(columns, rows, strict=True)]) for name in MOTION
             ]
-        for index in free:
-            x = hypothesis.x.copy()
-            x[index] += steps[index]
-            changed = at(x) - own
-            if np.isfinite(changed).all():
-                beside.append(changed)
+        changed = (_joined(left_in_channel(one, quiet, channel, plain), rows) - own for one in _other_values(without))
+        beside += [change for change in changed if np.isfinite(change).all()]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
         found[channel] = _Seen(rows, measured, own, np.column_stack(beside), least)
     return _Asked(found, plain, quiet)
+
+
+def _other_values(fit: Fit) -> Iterator[Hypothesis]:
+    """The hypothesis of a fit with each parameter beside those of the axis moved by a step, without edges."""
+    hypothesis, steps = fit.hypothesis, fit.estimator.steps(fit.hypothesis)
+    for index, one in enumerate(hypothesis.coordinates):
+        if index >= len(hypothesis.bench.axis.NOMINAL) and not one.edge:
+            x = hypothesis.x.copy()
+            x[index] += steps[index]
+            yield hypothesis.moved(x)
 
 
 def _joined(parts: Sequence[ResidualSeries], rows: Sequence[NDArray[np.bool_]]) -> FloatArray:

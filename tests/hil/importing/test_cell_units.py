@@ -182,13 +182,15 @@ def test_a_first_row_of_values_with_units_is_no_row_of_factors(tmp_path: Path) -
     assert not any(draft_map(path).table.scales.values())
 
 
-def test_rows_of_another_form_are_no_text_after_the_rows(tmp_path: Path) -> None:
-    path, half = tmp_path / "log.csv", T.size // 2
+@pytest.mark.parametrize(("many", "refused"), [(50, False), (51, True)])
+def test_many_rows_without_a_number_are_no_footer(tmp_path: Path, many: int, refused: bool) -> None:
+    path = tmp_path / "log.csv"
     lines = [f"{t:.3f};{a:.6f};{m:.5f}" for t, a, m in zip(T, ANGLE, TORQUE, strict=True)]
-    path.write_text(
-        "\n".join(["t;angle;torque", *lines[:half], *(one.replace(".", ",") for one in lines[half:])]) + "\n"
-    )
-    with pytest.raises(InputError, match=rf"log\.csv:{half + 2}: "):
+    path.write_text("\n".join(["t;angle;torque", *lines, *["1-5;0-2;0-1"] * many]) + "\n")
+    if not refused:
+        assert any("text after the last row" in note for note in draft_map(path).table.notes)
+        return
+    with pytest.raises(InputError, match=rf"log\.csv:{len(lines) + 2}: no number as in the rows before"):
         draft_map(path)
 
 

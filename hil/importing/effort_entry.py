@@ -19,7 +19,7 @@ from hil.quantities import UNITS
 
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
-_UNKNOWN = "(if nobody knows it, write 1: masses and friction then scale with it)"
+_UNKNOWN = "(if nobody knows it, write 1: inertia and friction are then multiples of the true ones)"
 _OR_SCREW = (
     "; or of a motor with a screw rename motor_position_m to motor_position_rad and force_n to torque_n_m, and write "
     "torque_constant_n_m_a here and lead_m above"

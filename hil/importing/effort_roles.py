@@ -15,7 +15,7 @@ from hil.quantities import UNITS
 NOTHING = 0.02  # share of a column that the motion explains, below which it is no torque of this axis
 EXPLAINED = 0.4  # share of a torque that one mass with friction explains: gravity and springs may be more
 _DERIVED = 0.5  # share of a velocity that is the derivative of its position: less is another motion
-_FOLLOWING = 0.9  # share of a position that is a multiple of a velocity: none that moves with it is
+_FOLLOWING = 0.9  # share of a column that its velocity explains, above which it is a following error, no position
 _WEAK = 0.5  # of the share of the best column: a column of less is another axis, or a part of the torque
 
 

@@ -45,7 +45,7 @@ _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
 _WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
 _MOST_BITS = 40.0  # of an encoder
-_SYMBOL = 3  # letters of a symbol, which stands for something else as well
+_SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
 _IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
 
 
@@ -152,7 +152,7 @@ def _constant(words: str, value: float, unit: str | None) -> tuple[bool, Constan
 
 
 def _says_all(known: ConstantWords, words: str) -> bool:
-    """True if words that end a text are no symbol of two letters, unless that of a torque or force constant."""
+    """True if words that end a text are more than a short symbol, or the symbol of a torque or force constant."""
     match = re.search(_pattern(known), words)
     found = match[1].replace(" ", "") if match else ""
     return len(found) > _SYMBOL or (found in lexicon().scalars.constant and found != "km")

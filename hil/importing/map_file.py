@@ -136,7 +136,7 @@ class ChannelSource(_Strict):
 
     @property
     def constant_of_one(self) -> str | None:
-        """Constant of an effort that is given as 1, as the map asks where nobody knows it; None for another value."""
+        """Name of a torque or force constant that is 1, which stands for an unknown one; None without such."""
         efforts = [field for unit, fields in _CONSTANTS.items() if not unit.startswith("counts") for field in fields]
         return next((field for field in efforts if getattr(self, field) == 1.0), None)
 

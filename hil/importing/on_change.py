@@ -7,15 +7,15 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.recording.quantum import count_of
 
-_RARELY = 0.05  # share of empty cells of another column of such a file, which few of them tell nothing by itself
+_RARELY = 0.05  # share of empty cells below which a column holds its values if another one of the file does
 _LEAST = 0.02  # share of empty cells: fewer are lost rows
 _DIFFER = 0.99  # share of the written values that differ from the one before
 # Share of the change over the empty cells that lost rows of a motion would bring: all of it, and a value that holds one
 # row of all.
 _LOST = 0.75
 _FEW = 3  # empty places before two written values, and written values: fewer tell nothing
-_LEAST_STEPS = 40  # turns of a noisy value, and steps by one digit: half as many would be by none
-_ONE = 1.5  # digits: below, a step is that by one
+_LEAST_STEPS = 40  # reversals of a noisy value, and steps by one digit, without one step by none: no chance
+_ONE = 1.5  # digits: a smaller step is one by one digit
 
 
 def columns_on_change(columns: Mapping[str, FloatArray]) -> list[str]:

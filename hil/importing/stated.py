@@ -1,4 +1,4 @@
-"""What a file states beside its columns by name: numbers and texts, a constant as a column, units of all of them.
+"""Constants and units that a file gives by name beside its columns, or as a column of one value.
 
 kt = 0.83, kt_unit = "Nm/A"        torque_constant.value = 0.83, torque_constant.unit = "Nm/A"
 torque_constant = "0.83 Nm/A"      a column kt [Nm/A] with 0.83 in every row

@@ -13,8 +13,6 @@ from hypothesis import strategies as st
 from drivers.eds_file import read_eds
 from drivers.eds_text import MOST_BYTES, EdsError
 
-# -- what is left in doubt is said ------------------------------------------------------------------------------------
-
 
 def test_of_keys_with_two_values_the_last_counts_and_is_named(tmp_path: Path) -> None:
     eds = read(tmp_path, CLEAN + "\n[6098]\nDataType=0x0003\nParameterName=Other\nHighLimit=\n")

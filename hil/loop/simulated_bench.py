@@ -32,6 +32,7 @@ from hil.errors import FieldError
 from hil.files.yaml_model import load_model
 
 RATED_TORQUE_N_M = 4.0  # of the simulated drive if the bench gives none
+MOST_COUNTS = 0xFFFF_FFFF  # per revolution: object 0x608F is UNSIGNED32
 
 
 class _Simulated(Bench):
@@ -95,10 +96,15 @@ class SimulatedNodes:
     def __init__(self, bench: Bench, port: CanPort, seed: int | None = None, plant: PlantLike | None = None) -> None:
         section = bench.drive or DriveSection()
         self.plant: PlantLike = plant or make_plant(bench, seed)
+        counts = round(_counts_per_turn(bench))
+        if not 1 <= counts <= MOST_COUNTS:
+            raise FieldError(
+                ("encoders", "motor"), f"given {counts:.3g} counts per revolution, allowed 1 to {MOST_COUNTS}"
+            )
         self.drive = SimulatedDrive(
             port, self.plant, node_id=section.node_id, servo=_servo(bench), period_s=bench.gains.period_s,
             rated_torque_n_m=section.rated_torque_n_m or RATED_TORQUE_N_M,
-            counts_per_rev=round(_counts_per_turn(bench)))  # fmt: skip
+            counts_per_rev=counts)  # fmt: skip
         self.encoder: SimulatedEncoder | None = None
         self.serial: SimulatedSerialEncoder | None = None
         if not bench.has_table_encoder or bench.encoders.table is None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from drivers.inprocess import InProcessBus
 from hil.bench.axis_models import OneMass, Rigid, SerialChain, SevenDofAxis, TwoMass
 from hil.bench.bench_file import load_bench
 from hil.bench.hardware import SimulationSection
 from hil.bench.turning_axes import Rotary, RotaryTwoMass
 from hil.errors import FieldError
-from hil.loop.simulated_bench import _counts_per_lead, _counts_per_turn, make_plant, true_axis
+from hil.loop.simulated_bench import SimulatedNodes, _counts_per_lead, _counts_per_turn, make_plant, true_axis
 from hil.twin.structure.modal import modal
 
 FRICTION = {"coulomb_torque_n_m": 0.3, "viscous_torque_n_m_s_rad": 0.002}
@@ -72,6 +74,16 @@ def test_counts_of_the_motor_encoder() -> None:
     assert _counts_per_turn(linear) == pytest.approx(2.0 * math.pi * 1e6)
     axis: Any = SimpleNamespace(linear=True, screw_ratio_m_rad=0.02 / (2.0 * math.pi))
     assert _counts_per_lead(linear, axis) == pytest.approx(0.02 / 1e-6)
+
+
+@pytest.mark.parametrize(("counts", "allowed"), [(1 << 20, True), (0xFFFF_FFFF, True), (1 << 32, False)])
+def test_counts_per_revolution_fit_the_object_of_the_drive(counts: int, allowed: bool) -> None:
+    """Object 0x608F is UNSIGNED32."""
+    reference = load_bench("reference")
+    motor = reference.encoders.motor.model_copy(update={"counts_per_rev": counts})
+    bench = reference.model_copy(update={"encoders": reference.encoders.model_copy(update={"motor": motor})})
+    with nullcontext() if allowed else pytest.raises(FieldError, match=r"encoders\.motor: .* allowed 1 to 4294967295"):
+        SimulatedNodes(bench, InProcessBus().port(), seed=1).close()
 
 
 @pytest.mark.parametrize(("seed", "allowed"), [(0, True), (7, True), (-1, False), (1.5, False)])

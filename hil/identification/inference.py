@@ -9,7 +9,7 @@ estimated from the residual of the better hypothesis.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -167,7 +167,7 @@ def _within(covariance: FloatArray, width: FloatArray) -> FloatArray:
     return np.asarray(covariance - gain @ np.linalg.solve(both, gain.T), dtype=np.float64)
 
 
-def standard_errors(fit: Fit) -> list[float]:
+def standard_errors(fit: Fit, known: Collection[int] = ()) -> list[float]:
     """Standard error of each physical parameter, robust against coloured residuals (sandwich estimator):
 
         A^-1 B A^-1,   A = J^T J
@@ -177,12 +177,14 @@ def standard_errors(fit: Fit) -> list[float]:
     the larger of both, multiplied by `_WIDENED`. The second holds for residuals that are correlated over more than a
     block. Nominal parameters lie within their bounds: what is told only together with one, as a delay with that of the
     recorded torque, is told to within these. A controller replayed bit-identically leaves no noise; then the error is
-    1/100 of the step of the forward difference.
+    1/100 of the step of the forward difference. The parameters of the indices `known` count as given.
     """
     hypothesis = fit.hypothesis
     low, high = hypothesis.bounds
-    width = (high - low)[: hypothesis.nominal_count]
-    errors = _largest([_within(one, width) for one in _covariances(fit.jacobian, fit.residuals)])
+    open_ = np.array([index not in known for index in range(low.size)])
+    width = (high - low)[: hypothesis.nominal_count][open_[: hypothesis.nominal_count]]
+    errors = np.zeros(low.size)
+    errors[open_] = _largest([_within(one, width) for one in _covariances(fit.jacobian[:, open_], fit.residuals)])
     steps = fit.estimator.steps(hypothesis)
     return [
         float(max(error, _LEAST * step) * (abs(value) if coordinate.logarithmic else abs(coordinate.scale)))

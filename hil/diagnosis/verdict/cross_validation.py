@@ -19,17 +19,15 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition, Harm, harm, torque_of
 from hil.diagnosis.search.forward_selection import claimed
-from hil.diagnosis.search.initial_values import axis_facts
 from hil.diagnosis.search.rivals import ENDED, RivalFit
 from hil.diagnosis.verdict.noise_free import energy_without_noise
+from hil.diagnosis.verdict.strength import strength_over_error
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import bic_margin, standard_errors
+from hil.identification.inference import bic_margin
 from hil.identification.noise_floor import unrepeated
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Key, Term, compatible, free_slot
-from hil.twin.library import BY_ID
-from hil.twin.parameter import Role
 
 Rivals = Mapping[Key, Sequence[RivalFit]]
 
@@ -151,7 +149,6 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
     fits = in_parallel([partial(without, index) for index in range(len(final.terms))])
     own_held_out = final.on(held_out) if held_out.runs else None
     differs = unrepeated(final.hypothesis, final.data)
-    clear = _clear(final)
 
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
@@ -175,7 +172,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
-            clear[index],
+            not final.jacobian.size or strength_over_error(final, index) > 1.0,  # without a Jacobian it is not told
             _quiet(final, other),
             torque_of(final, other, term, held_out),
             harm(final, other, given),
@@ -188,20 +185,6 @@ def _change(fit: Fit, without: Fit) -> float:
     """Mean squared change of the residuals by a term, in units of noise^2."""
     change = without.residuals.vector - fit.residuals.vector
     return float(change @ change) / change.size
-
-
-def _clear(fit: Fit) -> list[bool]:
-    """For each term, whether one of its strengths differs from no effect by more than its standard error."""
-    if not fit.jacobian.size:  # evaluated, not fitted
-        return [True] * len(fit.terms)
-    errors, axis = standard_errors(fit), axis_facts(fit.bench, fit.data.runs)
-    result = []
-    for index, term in enumerate(fit.terms):
-        mechanism, own = BY_ID[term.effect], errors[fit.hypothesis.columns(index)]
-        sizes = {place: abs(term.values[place]) for place in mechanism.indices(Role.STRENGTH)}
-        sizes[mechanism.strength] = mechanism.size(term.values, axis)
-        result.append(any(size > own[place] for place, size in sizes.items()))
-    return result
 
 
 def _quiet(fit: Fit, without: Fit) -> bool:

@@ -13,18 +13,18 @@ from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Correction, Finding, Rival, Value
-from hil.diagnosis.search.initial_values import axis_facts, claimable
+from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.stages import Searched
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
+from hil.diagnosis.verdict.strength import strength_over_error
 from hil.diagnosis.wording import sentence, title, unit_in
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
-from hil.identification.measured import Measured
 from hil.identification.terms import Key, Term, ambiguous, same_torque
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID
@@ -80,7 +80,7 @@ def findings(
                 Finding(
                     effect=term.effect,
                     variant=BY_ID[term.effect].forms[term.variant],
-                    confidence=_sure(term, errors, bench, runs)
+                    confidence=_sure(final, index)
                     * confidence(_left(fits, ablation.channel), _factor(ablation), margin),
                     equivalents=tuple(dict.fromkeys(tied)),
                     rivals=tuple(
@@ -162,15 +162,10 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
     }
 
 
-def _sure(term: Term, errors: Sequence[float], bench: Bench, runs: Sequence[Measured]) -> float:
+def _sure(fit: Fit, index: int) -> float:
     """Least probability that a strength differs from no effect, whatever the distribution of its error (Chebyshev)."""
-    mechanism = BY_ID[term.effect]
-    sizes = {place: abs(term.values[place]) for place in mechanism.indices(Role.STRENGTH)}
-    sizes[mechanism.strength] = mechanism.size(term.values, axis_facts(bench, runs))
-    return max(
-        max(1.0 - (errors[place] / size) ** 2, 0.0) if size > 0.0 and math.isfinite(errors[place]) else 0.0
-        for place, size in sizes.items()
-    )
+    ratio = strength_over_error(fit, index)
+    return 1.0 - 1.0 / ratio**2 if ratio > 1.0 else 0.0
 
 
 def _left(fits: Sequence[Fit], channel: str) -> float:

@@ -20,6 +20,7 @@ from hil.commands.compare import compare
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
+from hil.commands.explain import explain
 from hil.commands.friction import friction
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
@@ -63,6 +64,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("demo", demo),
     ("run", run),
     ("recover", recover),
+    ("explain", explain),
     ("import", import_),
     ("identify", identify),
     ("compare", compare),

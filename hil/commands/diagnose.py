@@ -8,7 +8,7 @@ import typer
 from hil.commands.options import Out, RecordedBench
 from hil.commands.runs import read_run
 from hil.diagnosis.time_left import BUDGET_S
-from hil.report.console import out, progress, table
+from hil.report.console import progress
 
 
 def diagnose(
@@ -39,11 +39,10 @@ def diagnose(
     from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
-    from hil.diagnosis.wording import title
     from hil.files.output import default_folder, new_folder
     from hil.identification.measured import bench_of
-    from hil.quantities import percent, quantity
-    from hil.report.diagnosis_report import torque_line, write_diagnosis
+    from hil.report.diagnosis_report import write_diagnosis
+    from hil.report.summary import print_diagnosis
 
     train = [read_run(path) for path in runs]
     held_out = [read_run(path) for path in validate or []]
@@ -54,38 +53,4 @@ def diagnose(
         diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
         tell("writing the report")
         write_diagnosis(diagnosis, part)
-    result = diagnosis.result
-    table(
-        (
-            "rms, held out" if result.fit and next(iter(result.fit.values())).validate_ else "rms",
-            "before",
-            "after",
-            "noise floor",
-        ),
-        [
-            (
-                name,
-                *(
-                    quantity(value, entry.unit)
-                    for value in (figures.best_before_rms, figures.after_rms, figures.noise_floor_rms)
-                ),
-            )
-            for name, entry in result.fit.items()
-            for figures in (entry.validate_ or entry.train,)
-        ],
-    )
-    if result.time_budget:
-        out.print(
-            f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
-        )
-    if result.findings:
-        out.print()
-        table(
-            ("found", "confidence that it is there"),
-            [(title(finding.effect), percent(finding.confidence)) for finding in result.findings],
-        )
-    if result.torque_left:
-        out.print(f"\n{torque_line(result.torque_left)}")
-    if result.not_identifiable:
-        out.print(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}; no correction is given.")
-    out.print(f"\n{result.statement}\n\nReport: {folder / 'report.html'}")
+    print_diagnosis(diagnosis.result, folder / "report.html")

@@ -1,7 +1,6 @@
 """hil identify."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
@@ -21,9 +20,9 @@ def identify(
 ) -> None:
     """Write a bench file of an axis from its recordings alone: masses, friction, lead, gains, encoders, with errors."""
     from hil.commands.warm_up import compile_kernels
-    from hil.drafting.bench_text import bench_text
     from hil.drafting.draft_bench import draft_bench
     from hil.errors import InputError
+    from hil.explanation import valid_bench_text
     from hil.files.input_file import is_file
     from hil.files.output import write_text
 
@@ -35,9 +34,7 @@ def identify(
     recordings = [read_run(run) for run in runs]
     compile_kernels()
     draft = draft_bench(*recordings)
-    text = bench_text(draft)
-    _validate(text, target)
-    write_text(target, text)
+    write_text(target, valid_bench_text(draft, target))
     values = [*draft.axis, *draft.control]
     rows = [
         (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.error) for one in values
@@ -49,18 +46,3 @@ def identify(
     for note in draft.unsure:
         err.print(f"Please check: {note}", markup=False)
     out.print(f"Bench: {target} ({draft.model})")
-
-
-def _validate(text: str, target: Path) -> None:
-    """Check a bench file before it is written, as `hil validate` does. Raises InputError."""
-    from hil.errors import InputError
-    from hil.loop.simulated_bench import load_simulated
-
-    with TemporaryDirectory() as folder:
-        written = Path(folder) / target.name
-        written.write_text(text, encoding="utf-8")
-        try:
-            load_simulated(written)
-        except InputError as error:
-            told = str(error).replace(f"{folder}/", "")
-            raise InputError(f"the draft is no valid bench, and is not written: {told}") from None

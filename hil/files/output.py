@@ -59,6 +59,24 @@ def new_folder(folder: Path) -> Iterator[Path]:
         raise
 
 
+@contextmanager
+def rewritten_folder(folder: Path, mark: str) -> Iterator[Path]:
+    """A folder to fill, which takes the place of `folder` when the block ends without an exception.
+
+    Raises InputError where `folder` holds something without the file `mark` of an earlier time.
+    """
+    if folder.is_dir() and not (folder / mark).is_file():
+        refuse_used(folder)
+    part = folder.with_name(f".{folder.name}.{os.getpid()}.new")
+    try:
+        with new_folder(part) as filled:
+            yield filled
+        shutil.rmtree(folder, ignore_errors=True)
+        part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a file through a temporary one beside it. Raises InputError where it cannot be written."""
     part = path.with_name(f".{path.name}.{os.getpid()}.part")

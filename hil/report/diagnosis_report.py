@@ -1,5 +1,6 @@
 """Report of `hil diagnose`: page, pictures, numbers, and the bench with the corrected parameters and the findings."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
@@ -34,8 +35,11 @@ _FIT_HEADERS = (
 )
 
 
-def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
-    """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml."""
+def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] = ()) -> None:
+    """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml.
+
+    `assumed` of recordings and bench is told on the page, so that a reader can correct it.
+    """
     result = diagnosis.result
     names = ", ".join(run.name for run in diagnosis.train.runs)
     good = result.verdict is not Verdict.UNEXPLAINED and result.time_budget is None
@@ -69,6 +73,9 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
         or "Every mechanism of the library would show in these recordings at a typical strength."
     )
     _next_experiment(page, diagnosis, folder)
+    if assumed:
+        page.heading("What was assumed")
+        page.items(list(assumed))
     ledger_section(page, result)
     page.heading("How it was judged")
     repeated = diagnosis.experiment.note if diagnosis.experiment else ""

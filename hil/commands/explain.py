@@ -1,0 +1,81 @@
+"""hil explain."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hil.diagnosis.time_left import BUDGET_S
+from hil.report.console import err, out, progress, table
+
+if TYPE_CHECKING:
+    from hil.explanation import Basis
+
+
+def explain(
+    data: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DATA...", show_default=False, help="Recordings of one axis: any file that hil import reads."
+        ),
+    ],
+    folder: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="Folder for maps, bench and report; maps and bench that are there are used. "
+            "Default: explained-NAME, of the first file, in this folder.",
+        ),
+    ] = None,
+    rate_hz: Annotated[
+        float | None,
+        typer.Option("--rate", min=0.1, help="Rows per second, for a file without time stamps.", show_default=False),
+    ] = None,
+    axis: Annotated[
+        str | None,
+        typer.Option(
+            help="Number or letter of the axis in the names of columns, of a file with several.", show_default=False
+        ),
+    ] = None,
+    show: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+    budget_s: Annotated[
+        float,
+        typer.Option("--budget", metavar="SECONDS", help="Processor time of the search; then the best answer so far."),
+    ] = BUDGET_S,
+) -> None:
+    """Explain recordings in one step: read them, draft the bench, find the physics that its twin lacks, write a page.
+
+    Correct what was assumed in the map or the bench of the folder, and call it again.
+    """
+    from hil.commands.warm_up import compile_kernels
+    from hil.explanation import explain as explain_files
+    from hil.report.summary import print_diagnosis
+
+    compile_kernels()
+    folder = folder or Path(f"explained-{data[0].stem}")
+    with progress() as tell:
+        found = explain_files(
+            data, folder, rate_hz=rate_hz, axis=axis, progress=tell, first=_first_answer, budget_s=budget_s
+        )
+    print_diagnosis(found.diagnosis.result, found.report)
+    if show:
+        import webbrowser
+
+        webbrowser.open(found.report.resolve().as_uri())
+
+
+def _first_answer(basis: "Basis") -> None:
+    """Print what is known before the search."""
+    if basis.draft is not None:
+        table(
+            ("", "value", "unit, standard error"),
+            [
+                (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.error)
+                for one in (*basis.draft.axis, *basis.draft.control)
+            ],
+        )
+        for note in basis.draft.notes:
+            out.print(f"  {note}")
+    err.print("Assumed:")
+    for note in basis.assumed:
+        err.print(f"  - {note}")

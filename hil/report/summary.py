@@ -1,0 +1,41 @@
+"""Summary of a diagnosis on the terminal."""
+
+from pathlib import Path
+
+from hil.diagnosis.result import Result
+from hil.diagnosis.wording import title
+from hil.quantities import percent, quantity
+from hil.report.console import out, table
+from hil.report.diagnosis_report import torque_line
+
+
+def print_diagnosis(result: Result, report: Path) -> None:
+    """Print residuals before and after, what was found, the statement, and where the page is."""
+    held_out = result.fit and next(iter(result.fit.values())).validate_
+    rows = [
+        (
+            name,
+            *(
+                quantity(value, entry.unit)
+                for value in (figures.best_before_rms, figures.after_rms, figures.noise_floor_rms)
+            ),
+        )
+        for name, entry in result.fit.items()
+        for figures in (entry.validate_ or entry.train,)
+    ]
+    table(("rms, held out" if held_out else "rms", "before", "after", "noise floor"), rows)
+    if result.time_budget:
+        out.print(
+            f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
+        )
+    if result.findings:
+        out.print()
+        table(
+            ("found", "confidence that it is there"),
+            [(title(finding.effect), percent(finding.confidence)) for finding in result.findings],
+        )
+    if result.torque_left:
+        out.print(f"\n{torque_line(result.torque_left)}")
+    if result.not_identifiable:
+        out.print(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}; no correction is given.")
+    out.print(f"\n{result.statement}\n\nReport: {report}")

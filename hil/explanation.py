@@ -28,6 +28,7 @@ from hil.identification.measured import bench_of
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import asked_lines, map_text
+from hil.importing.own_units import take_own_units
 from hil.loop.simulated_bench import load_simulated
 from hil.recording.recording import Recording, read_recording
 from hil.report.diagnosis_report import write_diagnosis
@@ -98,6 +99,7 @@ def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | No
     notes = [f"{path}: used as it is"]
     if not is_file(path):
         draft = draft_map(source, rate_hz, axis)
+        take_own_units(draft)
         folder.mkdir(parents=True, exist_ok=True)
         write_text(path, map_text(draft))
         notes = [f"{path}: which column is what, units and signs; drafted from the file"]

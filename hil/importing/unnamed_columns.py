@@ -31,7 +31,7 @@ def quantities_by_relations(
     for name in live:  # a letter is a name by chance: the data say more, where they say something
         if told[name].letter and told[name].unit is None:
             labels[name] = replace(told[name], quantity=Quantity.UNKNOWN)
-    unnamed = [name for name in live if labels[name].quantity is Quantity.UNKNOWN]
+    unnamed = [name for name in live if labels[name].quantity is Quantity.UNKNOWN and not _switches(live[name])]
     positions = [name for name in live if labels[name].quantity is Quantity.POSITION]
     if not unnamed:
         return labels, how
@@ -60,6 +60,8 @@ def quantities_by_relations(
             return told | {name: labels[name] for name in how}, how
         become(best, Quantity.POSITION, "a position: other columns follow from its derivatives")
         positions, unnamed = [best], [name for name in unnamed if name != best]
+    # a name says more than the motion, which explains a current with cogging or gravity in it badly
+    effort_told = any(one.quantity is Quantity.EFFORT and not one.command and not one.part for one in told.values())
     for name in unnamed:
         moved = {position: motion(live[position], period_s) for position in positions}
         if any(proportional(live[name], live[position]).share > SAME_POSITION for position in positions):
@@ -68,11 +70,16 @@ def quantities_by_relations(
             become(name, Quantity.VELOCITY, f"a velocity: it is the derivative of {positions[0]}")
         elif any(_accelerates(live[name], one, period_s) for one in moved.values()):
             become(name, Quantity.ACCELERATION, f"an acceleration: the second derivative of {positions[0]}")
-        elif max(driven(live[name], one, period_s).share for one in moved.values()) > IS_DRIVEN:
+        elif not effort_told and max(driven(live[name], one, period_s).share for one in moved.values()) > IS_DRIVEN:
             become(name, Quantity.EFFORT, f"{_EFFORT}: inertia and friction of {positions[0]} explain it")
         elif told[name].quantity is not Quantity.UNKNOWN:
             labels[name] = told[name]
     return labels, how
+
+
+def _switches(values: FloatArray) -> bool:
+    """True for a column of two values: a switch or a state, no channel of the motion."""
+    return bool(np.all((values == values.min()) | (values == values.max())))
 
 
 def _better_as_told(best: str, live: dict[str, FloatArray], told: dict[str, Label], period_s: float) -> str:

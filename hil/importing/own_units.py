@@ -1,0 +1,40 @@
+"""Take numbers of an unknown unit as they are, so that their axis can be looked at before the unit is known.
+
+A motion in numbers of its own unit has the same effects at the same places; masses, friction and stiffness are
+multiples, as if one of the numbers were the SI unit of its channel. A second encoder that is a length needs the lead:
+that is asked all the same.
+"""
+
+from math import tau
+
+from hil.channels import CHANNELS
+from hil.importing.map_draft import Asked, MapDraft
+
+# of keys that make one number the SI unit of its channel: one count 1 rad or 1 m, 1 A 1 N m or 1 N, 1 % the same
+_ONE = {
+    "counts_per_rev": tau,
+    "counts_per_m": 1.0,
+    "torque_constant_n_m_a": 1.0,
+    "force_constant_n_a": 1.0,
+    "rated": 100.0,
+    "gain": 1.0,
+}
+
+
+def take_own_units(draft: MapDraft) -> None:
+    """Answer what a draft asks of the size of numbers, and note it as unsure; columns and the lead are asked still."""
+    without_column = {one.channel for one in draft.asked if one.key == "column"}
+    left = list[Asked]()
+    for one in draft.asked:
+        unit = CHANNELS[one.channel].unit if one.channel else ""
+        value = unit if one.key == "unit" else _ONE.get(one.key)
+        if value is None or not one.channel or one.channel in without_column:
+            left.append(one)
+            continue
+        (drafted,) = (each for each in draft.channels if each.channel == one.channel)
+        drafted.entry[one.key] = value
+        draft.unsure.append(
+            f"{one.channel}: its numbers count as {unit}, so that values with {unit} are multiples ({one.key}: "
+            f"{value if one.key == 'unit' else f'{value:.9g}'}); correct it: {one.what}"
+        )
+    draft.asked[:] = left

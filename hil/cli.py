@@ -20,6 +20,7 @@ from hil.commands.compare import compare
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
+from hil.commands.export import export
 from hil.commands.friction import friction
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
@@ -64,6 +65,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("run", run),
     ("recover", recover),
     ("import", import_),
+    ("export", export),
     ("identify", identify),
     ("compare", compare),
     ("diagnose", diagnose),

@@ -13,7 +13,8 @@ def import_(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Foreign recording: text such as .csv, .mat, .npy, .npz, .mf4, .xml, .parquet or .json.",
+            help="Foreign recording: text such as .csv, .mat, .npy, .npz, .mf4, .mcap, .h5, .tdms, .ulg, .xml, .json, "
+            ".parquet; or a file of hil export.",
             show_default=False,
         ),
     ],
@@ -43,12 +44,18 @@ def import_(
 ) -> None:
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
     from hil.errors import InputError
+    from hil.exchange.own_file import read_exported
     from hil.importing.by_map import import_recording
     from hil.recording.recording import CLOCK_NOTES, write_parquet
 
     target = target or Path(f"{source.stem}.parquet")
     drafted = map_file is None
     if map_file is None:
+        own = read_exported(source)
+        if own is not None:
+            write_parquet(own, target)
+            out.print(f"{len(own)} rows, exported by this program\nRecording: {target}")
+            return
         map_file = str(_drafted(source, target, rate_hz, axis))
     elif rate_hz is not None or axis is not None:
         raise InputError("import: given --map and --rate or --axis, allowed only without a map; write it into the map")

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import tempfile
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from command_line import hil
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hil.channels import CHANNELS
-from hil.errors import InputError
 from hil.exchange.export import WRITERS, export_recording
 from hil.exchange.own_file import read_exported
 from hil.recording.recording import Recording, read_recording, write_parquet

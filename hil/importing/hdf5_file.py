@@ -20,7 +20,8 @@ _SHORT = 1_000_000  # characters of a text that is read
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """Datasets and fields of tables by name, texts, and attributes of the root.
 
-    Units, factors and missing values are those of the attributes of a dataset. Links to other files are not followed. Raises InputError: damaged, too many values, or h5py is not installed.
+    Units, factors and missing values are those of the attributes of a dataset. Links to other files are not followed.
+    Raises InputError: damaged, too many values, or h5py is not installed.
     """
     library = optional_library(path, "h5py", "h5py", "exchange")
     with parsing(path, "HDF5 file"), library.File(path, "r") as file:

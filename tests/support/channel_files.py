@@ -1,6 +1,6 @@
 """The known axis of `dialects` in files of groups of channels, each written by the library of its format.
 
-They have what such files have: groups of other rates, scaled integers, enumerations, invalid and missing samples, texts.
+They have what such files have: groups of other rates, scaled integers, enumerations, missing samples, texts.
 """
 
 from __future__ import annotations

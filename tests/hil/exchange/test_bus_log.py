@@ -1,0 +1,196 @@
+"""The log of a bus, written beside a run by a process of its own: decoded, it gives the rows of the run again."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+import yaml
+from bench_runs import MOVE
+from command_line import hil, refused
+from patient_bench import patient_bench
+
+from hil.bench.bench_file import Bench
+from hil.errors import FieldError, InputError
+from hil.exchange import can_frames
+from hil.exchange.bus_log import import_bus_log
+from hil.files import input_file
+from hil.loop.bus_log import log_bus
+from hil.loop.run import run_profile
+from hil.recording.recording import Recording, read_recording
+
+ENDINGS = (".blf", ".asc", ".log")
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return patient_bench(interface="udp_multicast", channel="239.74.163.41")
+
+
+@pytest.fixture(scope="module")
+def logged(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Recording]:
+    """A run in wall-clock time and the BLF file of its bus."""
+    folder = tmp_path_factory.mktemp("logged")
+    with log_bus(bench, folder / "bus.blf"):
+        ran = run_profile(bench, MOVE, folder, "run", force=True)
+    assert ran.complete
+    return folder / "bus.blf", read_recording(ran.recording)
+
+
+def frame(tick: int, can_id: int, data: bytes) -> can.Message:
+    return can.Message(timestamp=1e9 + 1e-3 * tick, arbitration_id=can_id, data=data, is_extended_id=False)
+
+
+def with_rated_torque(bench: Bench) -> Bench:
+    assert bench.drive is not None
+    return bench.model_copy(update={"drive": bench.drive.model_copy(update={"rated_torque_n_m": 14.0})})
+
+
+def converted(path: Path, ending: str, keep: range | None = None) -> Path:
+    """The log in another format of python-can; of its frames those of `keep` only."""
+    target = path.with_name(f"copy{'' if keep is None else keep.start}{ending}")
+    with can.LogReader(path) as frames, can.Logger(target) as copy:
+        for number, frame in enumerate(frames):
+            if keep is None or number in keep:
+                copy.on_message_received(frame)
+    return target
+
+
+def assert_same_rows(decoded: Recording, run: Recording, rows: int = 0) -> None:
+    """The rows of the run stand in those of the log, which begin before the drive is enabled."""
+    motor = run["motor_position_rad"]
+    enabled = int(np.argmax(decoded["drive_state"] == run["drive_state"][0]))
+    begin = enabled if not rows else int(np.flatnonzero(decoded["motor_position_rad"] == motor[rows])[0]) - rows
+    piece = slice(begin, begin + len(run))
+    for name in ("motor_position_rad", "table_position_m", "torque_n_m", "drive_state", "drive_error_code"):
+        np.testing.assert_array_equal(decoded[name][piece], run[name], err_msg=name)
+    np.testing.assert_allclose(decoded["torque_command_n_m"][piece], run["torque_command_n_m"], atol=0.51e-3 * 14)
+    np.testing.assert_allclose(np.diff(decoded["time_s"][piece]), np.diff(run["time_s"]), atol=1e-9)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_log_gives_the_rows_of_the_run_again(ending: str, bench: Bench, logged: tuple[Path, Recording]) -> None:
+    path, run = logged
+    decoded = import_bus_log(path if ending == ".blf" else converted(path, ending), bench)
+    assert decoded.period_s == run.period_s
+    assert decoded.metadata["units_from"] == "the set-up in the log"
+    assert_same_rows(decoded, run)
+
+
+def test_a_log_that_begins_after_the_set_up_is_read_by_the_bench(bench: Bench, logged: tuple[Path, Recording]) -> None:
+    path, run = logged
+    with can.LogReader(path) as frames:
+        count = sum(1 for _ in frames)
+    late = converted(path, ".asc", range(count // 3, count))
+    with pytest.raises(InputError, match=r"tells the rated torque \(object 0x6076\); give drive.rated_torque_n_m"):
+        import_bus_log(late, bench)
+    decoded = import_bus_log(late, with_rated_torque(bench))
+    assert decoded.metadata["units_from"] == "the bench"
+    motor = run["motor_position_rad"]
+    at = np.flatnonzero(motor == decoded["motor_position_rad"][100])
+    assert at.size == 1
+    np.testing.assert_array_equal(decoded["motor_position_rad"][:200], motor[at[0] - 100 :][:200])
+
+
+def test_positions_are_counted_on_over_the_wrap_of_their_object(tmp_path: Path, bench: Bench) -> None:
+    counts = np.arange(-50, 50) * 1000 + 2**31
+    path = tmp_path / "wrap.blf"
+    with can.Logger(path) as log:
+        for tick, count in enumerate(counts):
+            answer = (0x0237).to_bytes(2, "little") + int(count % 2**32).to_bytes(4, "little") + bytes(2)
+            for can_id, data in ((0x080, b""), (0x185, answer), (0x186, bytes(4)), (0x205, bytes(4))):
+                log.on_message_received(frame(tick, can_id, data))
+    motor = import_bus_log(path, with_rated_torque(bench))["motor_position_rad"]
+    np.testing.assert_allclose(np.diff(motor), 1000 * bench.motor_count)
+
+
+def test_the_mapping_in_the_log_counts_before_that_of_this_program(tmp_path: Path, bench: Bench) -> None:
+    """Another master: position and velocity in TPDO 2 at another identifier, the statusword in TPDO 1."""
+    written = {
+        (0x608F, 1): 4096, (0x608F, 2): 1, (0x6076, 0): 2000,
+        (0x1800, 1): 0x185, (0x1A00, 0): 1, (0x1A00, 1): 0x60410010,
+        (0x1801, 1): 0x3A5, (0x1A01, 0): 2, (0x1A01, 1): 0x606C0020, (0x1A01, 2): 0x60640020,
+        (0x1A02, 0): 1, (0x1A02, 1): 0x60770010, (0x1600, 0): 1, (0x1600, 1): 0x60710010,
+    }  # fmt: skip
+    path = tmp_path / "other.asc"
+    with can.Logger(path) as log:
+
+        def put(tick: int, can_id: int, data: bytes) -> None:
+            log.on_message_received(frame(tick, can_id, data))
+
+        for (index, subindex), value in written.items():
+            request = b"\x23" + index.to_bytes(2, "little") + bytes([subindex]) + value.to_bytes(4, "little")
+            put(0, 0x605, request)
+        for tick in range(100):
+            put(tick, 0x080, b"")
+            put(tick, 0x185, (0x0237).to_bytes(2, "little"))
+            put(tick, 0x3A5, bytes(4) + (-tick).to_bytes(4, "little", signed=True))
+            put(tick, 0x385, (tick).to_bytes(2, "little"))
+            put(tick, 0x205, (-tick).to_bytes(2, "little", signed=True))
+    decoded = import_bus_log(path, bench)
+    np.testing.assert_array_equal(decoded["motor_position_rad"], -np.arange(99.0) * (2 * np.pi / 4096))
+    np.testing.assert_allclose(decoded["torque_n_m"], 2e-3 * np.arange(1.0, 100.0))
+    np.testing.assert_allclose(decoded["torque_command_n_m"], -2e-3 * np.arange(99.0))
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_damaged_logs_are_refused_or_read_to_their_damage(
+    ending: str, tmp_path: Path, bench: Bench, logged: tuple[Path, Recording]
+) -> None:
+    path, _ = logged
+    whole = (path if ending == ".blf" else converted(path, ending)).read_bytes()
+    damaged = tmp_path / f"bus{ending}"
+    for content in (b"", b"\0" * 500, b"no log\n" * 50, whole[:100], whole[: len(whole) // 2], whole[:-7],
+                    whole[:200] + b"\xff" * 64 + whole[264:]):  # fmt: skip
+        damaged.write_bytes(content)
+        try:
+            rows = len(import_bus_log(damaged, bench))
+        except InputError as error:
+            assert str(damaged) in str(error)  # noqa: PT017  (whether it is refused depends on the place)
+        else:
+            assert rows > 2
+
+
+def test_a_compressed_log_is_bounded(tmp_path: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(can_frames, "MOST_BYTES", 8000)
+    monkeypatch.setattr(input_file, "MOST_VALUES", 1000)
+    data = zlib.compress(bytes(9000))
+    path = tmp_path / "bomb.blf"
+    container = struct.pack("<4sHHII", b"LOBJ", 16, 1, 32 + len(data), 10) + bytes(16) + data
+    path.write_bytes(b"LOGG" + bytes(140) + container)
+    with pytest.raises(InputError, match="expand to more than 8000, allowed 1000 values"):
+        import_bus_log(path, bench)
+
+
+def test_wrong_arguments_are_refused(tmp_path: Path, bench: Bench) -> None:
+    (tmp_path / "bus.blf").write_bytes(b"LOGG")
+    (tmp_path / "bus.csv").write_text("t,x\n0,1\n")
+    assert "say whose: hil import bus.blf --bench BENCH" in refused(tmp_path, "import", "bus.blf")
+    told = refused(tmp_path, "import", "bus.csv", "--bench", "reference")
+    assert "bus.csv: given the ending '.csv' with --bench, allowed .blf, .asc, .log" in told
+    assert "allowed one of them" in refused(tmp_path, "import", "bus.blf", "--bench", "reference", "--map", "emps")
+    virtual = patient_bench(interface="virtual")
+    for of, name, error, told in (
+        (bench, "bus.txt", InputError, r"given the ending '.txt', allowed .blf, .asc, .log"),
+        (bench, "bus.blf", InputError, "the file exists and is not overwritten"),
+        (virtual, "new.blf", FieldError, "given virtual with a log of the bus, allowed socketcan or udp_multicast"),
+    ):
+        with pytest.raises(error, match=told), log_bus(of, tmp_path / name):
+            pass
+
+
+def test_the_commands_log_and_import(tmp_path: Path, bench: Bench) -> None:
+    (tmp_path / "bench.yaml").write_text(yaml.safe_dump(bench.model_dump(mode="json", exclude_none=True)))
+    (tmp_path / "move.yaml").write_text(yaml.safe_dump(MOVE.model_dump(mode="json", exclude_none=True)))
+    ran = hil(
+        tmp_path, "run", "move.yaml", "--bench", "bench.yaml", "--force", "--out", "run", "--bus-log", "logs/a.blf"
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert "Log of the bus: logs/a.blf" in ran.stdout
+    ran = hil(tmp_path, "import", "logs/a.blf", "--bench", "bench.yaml", "--out", "decoded.parquet")
+    assert ran.returncode == 0, ran.stderr
+    assert_same_rows(read_recording(tmp_path / "decoded.parquet"), read_recording(tmp_path / "run" / "move.parquet"))

@@ -22,8 +22,14 @@ def export(
     ] = False,
 ) -> None:
     """Write a recording for other tools: channels, units and metadata. `hil import` reads it back without a map."""
-    from hil.exchange.export import export_recording
+    from hil.exchange.export import export_recording, refuse_existing
+    from hil.exchange.plotjuggler import layout_path, write_layout
 
+    if plotjuggler:
+        refuse_existing(layout_path(target))
     read = read_run(recording)
-    for path in export_recording(read, target):
+    paths = export_recording(read, target)
+    if plotjuggler:
+        paths += (write_layout(target, read.axis, read.columns),)
+    for path in paths:
         out.print(f"Export: {path}")

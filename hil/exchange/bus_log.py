@@ -20,8 +20,8 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.errors import InputError
-from hil.exchange.can_frames import Node, read_frames
+from hil.errors import InputError, listed
+from hil.exchange.can_frames import BusFrames, Node, read_frames
 from hil.files.input_file import bounded
 from hil.loop.eds_files import MODES
 from hil.recording.recording import Recording, clock_metadata
@@ -37,48 +37,48 @@ def import_bus_log(path: Path, bench: Bench) -> Recording:
 
     Raises InputError: no readable log, no SYNC, no answers of the drive, units that neither log nor bench tell.
     """
-    section = bench.drive or DriveSection()
     frames = read_frames(path)
+    rows = sync_rows(frames, bench)
+    regular = regular_rows(rows, lambda row: f"{path}: row {row + 1} (a SYNC each)", period_s=bench.period_s)
+    metadata = {"source": path.name, "bench": bench.model_dump(mode="json")} | clock_metadata(regular)
+    return Recording(path.stem, regular.columns, regular.period_s, metadata)
+
+
+def sync_rows(frames: BusFrames, bench: Bench) -> dict[str, FloatArray]:
+    """Channels (n,) at each SYNC from the first at which all are known. Raises InputError as `import_bus_log`."""
+    path, section, mode = frames.path, bench.drive or DriveSection(), MODES[(bench.drive or DriveSection()).mode]
     if frames.syncs.size < _LEAST:
         raise InputError(
             f"{path}: given {frames.syncs.size} SYNC messages (identifier 0x080), allowed {_LEAST} or more; log a run"
         )
-    mode = MODES[section.mode]
     drive = Node(frames, section.node_id, {0: FEEDBACK}, {0: commands(mode)})
-    names = AXIS_CHANNELS[AxisKind.LINEAR if bench.axis.linear else AxisKind.ROTARY]
-    si_per_count, si_per_mille = _units(path, drive, bench, section)
-    statusword = drive.sampled(Index.STATUSWORD)
-    counts, torque = drive.sampled(Index.POSITION_ACTUAL), drive.sampled(Index.TORQUE_ACTUAL)
+    statusword, counts = drive.sampled(Index.STATUSWORD), drive.sampled(Index.POSITION_ACTUAL)
     if statusword is None or counts is None:
         raise InputError(
             f"{path}: the drive (drive.node_id {section.node_id}) sends no statusword and position in its PDOs, "
             f"given frames of the identifiers {frames.identifiers}; correct the bench"
         )
-    columns: dict[str, FloatArray] = {names.motor_position: counts * si_per_count}
+    names = AXIS_CHANNELS[AxisKind.LINEAR if bench.axis.linear else AxisKind.ROTARY]
+    si_per_count, si_per_mille = _units(path, drive, bench, section)
+    columns = {"time_s": frames.tick_times(bench.period_s), names.motor_position: counts * si_per_count}
     if bench.has_table_encoder and section.encoder.interface == "canopen":
         encoder = Node(frames, section.encoder.node_id, {0: PROCESS_DATA}, {})
         table = encoder.sampled(Index.ENCODER_POSITION)
         if table is not None and bench.encoders.table is not None:
             step_nm = encoder.object(Index.ENCODER_STEP_SETTINGS, 1)
-            step_m = step_nm / 1e9 if step_nm else bench.encoders.table.resolution_m
-            columns[names.table_position] = table * step_m
+            columns[names.table_position] = table * (step_nm / 1e9 if step_nm else bench.encoders.table.resolution_m)
     columns |= _command(drive, mode, bench, names, si_per_count, si_per_mille)
+    torque = drive.sampled(Index.TORQUE_ACTUAL)
     if torque is not None:
-        columns[names.torque] = np.r_[torque[1:], torque[-1:]] * si_per_mille
-    columns["drive_state"] = _STATES[statusword.astype(np.int64) & 0x7F]
+        columns[names.torque] = np.r_[torque[1:], np.nan] * si_per_mille
+    columns["drive_state"] = _STATES[np.nan_to_num(statusword).astype(np.int64) & 0x7F]
     columns["drive_error_code"] = drive.error_codes()
-    first = int(np.argmax(np.logical_and.reduce([np.isfinite(values) for values in columns.values()])))
-    last = len(counts) - 1 if torque is not None else len(counts)
-    time_s = frames.tick_times(bench.period_s)
-    rows = {"time_s": time_s - time_s[first]} | columns
-    rows = {name: values[first:last] for name, values in rows.items()}
-    regular = regular_rows(rows, lambda row: f"{path}: SYNC {first + row + 1}", period_s=bench.period_s)
-    metadata: dict[str, Any] = {
-        "source": path.name,
-        "bench": bench.model_dump(mode="json"),
-        "units_from": "the set-up in the log" if drive.object(Index.POSITION_ENCODER_RESOLUTION, 1) else "the bench",
-    }
-    return Recording(path.stem, regular.columns, regular.period_s, metadata | clock_metadata(regular))
+    known = np.flatnonzero(np.logical_and.reduce([np.isfinite(values) for values in columns.values()]))
+    if not known.size:
+        raise InputError(f"{path}: at no SYNC are all of {listed(columns)} known; log a longer part of the run")
+    rows = slice(int(known[0]), int(known[-1]) + 1)
+    start_s = columns["time_s"][rows.start]
+    return {name: values[rows] - (start_s if name == "time_s" else 0.0) for name, values in columns.items()}
 
 
 def _units(path: Path, drive: Node, bench: Bench, section: DriveSection) -> tuple[float, float]:

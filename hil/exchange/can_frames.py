@@ -6,7 +6,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import IO, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ _CONTAINER: Final = 10  # BLF: type of an object that holds others, compressed
 _SDO_ANSWER, _SDO_REQUEST = 0x580, 0x600
 _EMERGENCY, _TPDO, _RPDO = 0x080, 0x180, 0x200
 _DRIFT_ROWS: Final = 1000  # over which two clocks differ by less than half a period at 1 kHz
+_VIRTUAL: Final = 0.25  # of a period
 _PDOS: Final = 4  # whose identifiers CiA 301 predefines
 
 
@@ -54,14 +55,21 @@ class BusFrames:
         """Time of each SYNC since the first (n,): whole periods, of which the loop may have left some out.
 
         The program that logs may stamp a frame late, but never early: only what stays late until the end was left out.
-        Stamps that do not have this period, as of a run in virtual time, tell nothing: one period each.
+        Much shorter steps than a period, as of a run in virtual time, tell nothing: one period each. Raises InputError
+        for another period.
         """
         count = self.syncs.size
         late = (self.syncs - self.syncs[0]) / period_s - np.arange(count)
-        if np.ptp(late) > count:
-            return np.arange(count) * period_s
+        step = float(np.median(np.diff(self.syncs))) / period_s
+        if step < _VIRTUAL:
+            return np.asarray(np.arange(count) * period_s)
+        if abs(step - 1.0) > _VIRTUAL:
+            raise InputError(
+                f"{self.path}: SYNC comes every {step * period_s:.3g} s, allowed {period_s:g} s as in the bench; give "
+                "the bench of this log"
+            )
         if count > 10 * _DRIFT_ROWS:  # the clock of another PC
-            late -= np.median(late[_DRIFT_ROWS:] - late[:-_DRIFT_ROWS]) / _DRIFT_ROWS * np.arange(count)
+            late = late - np.median(late[_DRIFT_ROWS:] - late[:-_DRIFT_ROWS]) / _DRIFT_ROWS * np.arange(count)
         stays = np.minimum.accumulate(late[::-1])[::-1]
         return np.asarray((np.arange(count) + np.round(stays - stays[0])) * period_s)
 
@@ -76,8 +84,9 @@ def read_frames(path: Path) -> BusFrames:
     if path.suffix.lower() == ".blf":
         _check_blf_size(path)
     by_id, syncs, frames = dict[int, list[Frame]](), list[float](), 0
-    with parsing(path, "log of a CAN bus"), can.LogReader(path) as messages:
-        for message in messages:
+    readers = {".blf": can.BLFReader, ".asc": can.ASCReader, ".log": can.CanutilsLogReader}
+    with parsing(path, "log of a CAN bus"), _opened(path) as file:
+        for message in readers[path.suffix.lower()](file):
             if foreign_kind(message):
                 continue
             if message.arbitration_id == SYNC:
@@ -87,6 +96,10 @@ def read_frames(path: Path) -> BusFrames:
             frames += 1
             check_values(path, _VALUES_OF_FRAME * frames, f"more than {frames} frames")
     return BusFrames(path, by_id, np.array(syncs, dtype=np.float64))
+
+
+def _opened(path: Path) -> IO[Any]:
+    return path.open("rb") if path.suffix.lower() == ".blf" else path.open(encoding="utf-8", errors="replace")
 
 
 def _check_blf_size(path: Path) -> None:

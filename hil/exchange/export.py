@@ -24,6 +24,12 @@ WRITERS: dict[str, Callable[[Path, Content], None]] = {
 }
 
 
+def refuse_existing(path: Path) -> None:
+    """Raise InputError for a file that exists."""
+    if is_file(path):
+        raise InputError(f"{path}: the file exists and is not overwritten; give another name or remove it")
+
+
 def export_recording(recording: Recording, path: Path) -> tuple[Path, ...]:
     """Write a recording to `path`, whole or not at all; return the files. A CSV file has its metadata in a second one.
 
@@ -34,8 +40,7 @@ def export_recording(recording: Recording, path: Path) -> tuple[Path, ...]:
         raise InputError(f"{path}: given the ending {path.suffix!r}, allowed {', '.join(WRITERS)}; correct it")
     beside = [metadata_path(path)] if ending == ".csv" else []
     for target in (path, *beside):
-        if is_file(target):
-            raise InputError(f"{target}: the file exists and is not overwritten; give another name or remove it")
+        refuse_existing(target)
     part = path.with_name(f".{path.stem}.{os.getpid()}.part{ending}")
     content = content_of(recording)
     try:

@@ -17,7 +17,7 @@ def load_tdms(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     damaged, too many values, or npTDMS is not installed.
     """
     library = optional_library(path, "nptdms", "npTDMS", "exchange")
-    with parsing(path, "TDMS file"), library.TdmsFile.open(path) as file:
+    with parsing(path, "TDMS file"), path.open("rb") as raw, library.TdmsFile.open(raw) as file:
         channels = [one for group in file.groups() for one in group.channels()]
         values = sum(len(one) for one in channels)
         check_values(path, values, f"channels of {values} values")

@@ -16,8 +16,8 @@ def load_ulog(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     Raises InputError: damaged, too many values, or pyulog is not installed.
     """
     library = optional_library(path, "pyulog", "pyulog", "exchange")
-    with parsing(path, "ULog file"):
-        topics = library.ULog(str(path), disable_str_exceptions=True).data_list
+    with parsing(path, "ULog file"), path.open("rb") as raw:
+        topics = library.ULog(raw, disable_str_exceptions=True).data_list
         values = sum(one.data[_STAMP].size * len(one.data) for one in topics)
         check_values(path, values, f"topics of {values} values")
         start = min((one.data[_STAMP][0] for one in topics if one.data[_STAMP].size), default=0)

@@ -1,35 +1,24 @@
-"""Every format of `hil export`: what comes back is the recording, bit by bit, and other programs read it."""
+"""Every format of `hil export`: what comes back is the recording, bit by bit."""
 
 from __future__ import annotations
 
-import importlib.util
 import tempfile
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from exported import FORMATS, assert_same
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hil.channels import CHANNELS
-from hil.exchange.export import WRITERS, export_recording
+from hil.exchange.export import export_recording
 from hil.exchange.own_file import read_exported
 from hil.recording.recording import Recording, read_recording, write_parquet
 from hil.recording.stamps import LARGEST
 
-LIBRARIES = {".mf4": "asammdf", ".mcap": "mcap", ".h5": "h5py", ".hdf5": "h5py"}
-FORMATS = [
-    pytest.param(
-        ending,
-        marks=pytest.mark.skipif(
-            ending in LIBRARIES and importlib.util.find_spec(LIBRARIES[ending]) is None,
-            reason=f"{LIBRARIES.get(ending)} is an optional extra and not installed",
-        ),
-    )
-    for ending in WRITERS
-]
 NUMBERS = st.floats(-LARGEST, LARGEST, allow_nan=False)
 TEXTS = st.text(st.characters(codec="utf-8"), max_size=20)
 JSON = st.recursive(
@@ -38,23 +27,19 @@ JSON = st.recursive(
     max_leaves=8,
 )
 OTHERS = sorted(set(CHANNELS) - {"time_s", "motor_position_m", "motor_velocity_m_s"})
+PART = 250  # rows
 
 
 @st.composite
 def recordings(draw: st.DrawFn) -> Recording:
     """A recording as a file holds it: of both kinds, with gaps, any numbers, and metadata of any shape."""
     period_s = draw(st.sampled_from([1e-3, 2.5e-4, 0.004, 1 / 3000]))
-    rows = draw(st.integers(1, 3)) * 250
-    gaps = draw(st.lists(st.integers(11, 5000), min_size=0, max_size=2)) if rows > 250 else []
-    ticks = np.arange(rows)
-    for number, gap in enumerate(gaps, 1):
-        ticks[250 * number :] += gap
-    start_s = draw(st.sampled_from([0.0, 0.25, 1e3]))
+    gaps = draw(st.lists(st.integers(11, 5000), max_size=2))
+    ticks = np.concatenate([np.arange(PART) + number * PART + sum(gaps[:number]) for number in range(len(gaps) + 1)])
+    columns = {"time_s": draw(st.sampled_from([0.0, 0.25, 1e3])) + ticks * period_s}
     motion = draw(st.sampled_from([("motor_position_rad", "torque_n_m"), ("motor_position_m", "force_n")]))
-    names = [*motion, *draw(st.sets(st.sampled_from(OTHERS), max_size=4))]
-    columns = {"time_s": start_s + ticks * period_s}
-    for name in dict.fromkeys(names):
-        columns[name] = draw(hnp.arrays(np.float64, 250, elements=NUMBERS)).repeat(rows // 250)
+    for name in dict.fromkeys([*motion, *draw(st.sets(st.sampled_from(OTHERS), max_size=4))]):
+        columns[name] = np.tile(draw(hnp.arrays(np.float64, PART, elements=NUMBERS)), len(gaps) + 1)
     metadata = draw(st.dictionaries(st.sampled_from(["seed", "about", "ß 名", "bench"]), JSON, max_size=3))
     metadata |= draw(st.sampled_from([{}, {"start_time": "2026-02-03T04:05:06+0100"}, {"start_time": "virtual time"}]))
     return Recording("run", columns, period_s, metadata)
@@ -75,13 +60,3 @@ def test_a_round_trip_loses_nothing(ending: str, made: Recording) -> None:
             back = read_exported(folder / f"run{ending}")
     assert back is not None
     assert_same(back, recording)
-
-
-def assert_same(one: Recording, other: Recording) -> None:
-    assert one.name == other.name
-    assert one.period_s == other.period_s
-    assert one.metadata == other.metadata
-    assert set(one.columns) == set(other.columns)
-    for name, values in other.columns.items():
-        assert one[name].tobytes() == values.tobytes(), name
-    assert [(part.start_s, len(part)) for part in one.parts()] == [(part.start_s, len(part)) for part in other.parts()]

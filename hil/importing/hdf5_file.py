@@ -14,7 +14,6 @@ from hil.importing.lexicon import Quantity
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _FACTORS, _OFFSETS = ("scale_factor",), ("add_offset",)  # of the conventions CF for netCDF
 _MISSING = ("_FillValue", "missing_value")
-_SHORT = 1_000_000  # characters of a text that is read
 
 
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
@@ -31,8 +30,10 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
         check_values(path, values, f"datasets of {values} values")
         groups = dict[str, list[Any]]()
         for one in datasets:
-            groups.setdefault(one.parent.name if one.dtype.names is None else one.name, []).append(one)
-        read = [_group(library, name, members) for name, members in groups.items()]
+            folder = one.parent.name if one.dtype.names is None else one.name
+            if not folder.startswith("/#"):  # what MATLAB refers to by pointers
+                groups.setdefault(folder, []).append(one)
+        read = [group for name, members in groups.items() for group in _groups(library, name, members)]
         scalars = (str, int, float, np.integer, np.floating)
         texts = {name: np.array(value) for name, value in file.attrs.items() if isinstance(value, scalars)}
     arrays, units = one_length(path, read)
@@ -44,27 +45,39 @@ def _is_own(library: Any, one: Any) -> bool:
     return isinstance(one, library.Dataset) and one.shape is not None and not one.external and not one.is_virtual
 
 
-def _group(library: Any, name: str, datasets: list[Any]) -> Group:
-    """Datasets of one folder, its clock first."""
+def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
+    """Datasets of one folder: those on its clock, which comes first, and the others."""
     channels, units = dict[str, Any](), dict[str, str]()
     for one in datasets:
         key = one.name.rpartition("/")[2]
         if library.check_string_dtype(one.dtype) is not None:
             if one.size == 1:
-                channels[key] = np.array(one.asstr()[()].reshape(-1)[0] if one.shape else one.asstr()[()])
+                channels[key] = np.array(_text(one[()]))
             continue
-        read = one[()]
-        given = {key: read} if one.dtype.names is None else {field: read[field] for field in one.dtype.names}
+        read = _matlab(one)
+        given = {key: read} if read.dtype.names is None else {field: read[field] for field in read.dtype.names}
         for own, values in given.items():
             channels[own] = _scaled(one.attrs, values)
             units[own] = next((_text(one.attrs[key]) for key in _UNITS if key in one.attrs), "")
-    vectors = [own for own, values in channels.items() if values.dtype.kind in "fiub" and values.size > 1]
-    clocks = [own for own in vectors if label(own, units.get(own, "")).quantity is Quantity.TIME]
-    first = clocks[:1]
-    of_rows = [own for own in vectors if len(channels[own]) == len(channels[first[0]])] if first else []
-    ordered = dict.fromkeys([*first, *clocks, *channels])
-    has_clock = len(of_rows) > 1 and len(of_rows) == len(channels)
-    return Group(name.strip("/").replace("/", ".") or "root", {own: channels[own] for own in ordered}, units, has_clock)
+    rows = {own: len(values) for own, values in channels.items() if values.dtype.kind in "fiub" and values.size > 1}
+    clocks = [own for own in rows if label(own, units.get(own, "")).quantity is Quantity.TIME]
+    on_clock = [own for own in dict.fromkeys([*clocks, *rows]) if clocks and rows[own] == rows[clocks[0]]]
+    on_clock = on_clock if len(on_clock) > 1 else []  # a clock alone is that of other folders
+    rest = [own for own in channels if own not in on_clock]
+    folder = name.strip("/").replace("/", ".") or "root"
+    return [
+        Group(folder, {own: channels[own] for own in names}, units, has_clock)
+        for names, has_clock in ((on_clock, True), (rest, False))
+    ]
+
+
+def _matlab(dataset: Any) -> Any:
+    """Values of a dataset; those of MATLAB (.mat of version 7.3) are transposed, and its texts are numbers."""
+    kind = _text(dataset.attrs.get("MATLAB_class", ""))
+    values = dataset[()]
+    if kind == "char":
+        return np.array("".join(map(chr, np.asarray(values).T.reshape(-1))))
+    return np.asarray(values).T if kind else values
 
 
 def _scaled(attributes: Any, values: Any) -> Any:
@@ -91,7 +104,7 @@ def _number(attributes: Any, names: tuple[str, ...], default: float) -> float:
 
 
 def _text(value: Any) -> str:
-    """An attribute of text, which libraries store as text, bytes, or an array of one of them."""
+    """A text, which libraries store as text, bytes, or an array of one of them."""
     one = np.asarray(value).reshape(-1)
     first = one[0] if one.size else ""
     return first.decode(errors="replace") if isinstance(first, bytes) else str(first)

@@ -18,7 +18,7 @@ from hil.importing.ulog_file import load_ulog
 
 Loaded = tuple[dict[str, Any], dict[str, str]]
 _LOADERS: dict[str, Callable[[Path], Loaded]] = {
-    ".mat": lambda path: (load_mat(path), {}),
+    ".mat": lambda path: load_hdf5(path) if _is_hdf5(path) else (load_mat(path), {}),
     ".npy": lambda path: (_numpy(path), {}),
     ".npz": lambda path: (_numpy(path), {}),
     ".mf4": load_mdf,
@@ -41,6 +41,12 @@ class Variables(NamedTuple):
 def load_variables(path: Path) -> Variables:
     """Read `path` by its ending. Raises InputError: damaged, too many values, or a library that is not installed."""
     return Variables(*_LOADERS[path.suffix.lower()](path))
+
+
+def _is_hdf5(path: Path) -> bool:
+    """True for a .mat file of version 7.3, which is an HDF5 file behind a head of 512 bytes."""
+    with path.open("rb") as file:
+        return file.read(520)[512:] == b"\x89HDF\r\n\x1a\n"
 
 
 def _numpy(path: Path) -> dict[str, Any]:

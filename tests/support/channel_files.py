@@ -73,6 +73,23 @@ def hdf5_table(path: Path) -> None:
         file.create_dataset("run/rows", data=rows, compression="gzip")
 
 
+def mat_of_version_7_3(path: Path) -> None:
+    """What `save -v7.3` of MATLAB writes: a head, transposed arrays, texts as numbers, a structure as a folder."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        kind = "MATLAB_class"
+        for name, values in (("t", T), ("data/angle_rad", ANGLE), ("data/torque_Nm", TORQUE)):
+            file[name] = values[None, :]  # a column of MATLAB
+            file[name].attrs[kind] = np.bytes_("double")
+        file["data"].attrs[kind] = np.bytes_("struct")
+        file["note"] = np.array([[ord(letter)] for letter in "test rig"], dtype=np.uint16)
+        file["note"].attrs[kind] = np.bytes_("char")
+        file.create_group("#refs#")["a"] = np.arange(9.0)
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM")
+
+
 def mcap_json(path: Path) -> None:
     """Two topics of JSON, one of another rate, with nested fields, a text and a message without a field."""
     from mcap.writer import CompressionType, Writer

@@ -158,8 +158,10 @@ def test_wrong_targets_are_refused(folder: Path) -> None:
     assert "given --plotjuggler with the ending '.mat', allowed .csv, .mcap" in told
 
 
-@pytest.mark.parametrize(("ending", "module", "extra"), [(".mf4", "asammdf", "mf4"), (".mcap", "mcap.writer", "exchange"),
-                                                        (".h5", "h5py", "exchange")])  # fmt: skip
+EXTRAS = [(".mf4", "asammdf", "mf4"), (".mcap", "mcap.writer", "exchange"), (".h5", "h5py", "exchange")]
+
+
+@pytest.mark.parametrize(("ending", "module", "extra"), EXTRAS)
 def test_an_extra_that_is_not_installed_is_named(
     ending: str, module: str, extra: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from channel_files import ANGLE, CHANNEL_FILES, START_NS, TORQUE, T
+from channel_files import ANGLE, CHANNEL_FILES, START_NS, TORQUE, T, mat_of_version_7_3
 from exported import needs
 
 from hil.errors import InputError
@@ -119,6 +119,16 @@ def test_groups_of_other_rates_are_merged_by_their_stamps(ending: str, tmp_path:
     assert recording.period_s == pytest.approx(1e-3)
     np.testing.assert_allclose(recording["motor_position_rad"], ANGLE[:rows], atol=1e-9)
     np.testing.assert_allclose(recording["torque_n_m"][::4], TORQUE[:rows:4], atol=1e-9)
+
+
+@pytest.mark.parametrize("library", [pytest.param("h5py", marks=needs(".h5"))])
+def test_matlab_files_of_version_7_3_are_read_as_the_hdf5_that_they_are(library: str, tmp_path: Path) -> None:
+    path = tmp_path / "axis.mat"
+    mat_of_version_7_3(path)
+    assert str(load_variables(path).arrays["note"]) == "test rig"
+    recording = imported(path)
+    np.testing.assert_allclose(recording["motor_position_rad"], ANGLE)
+    np.testing.assert_allclose(recording["torque_n_m"], TORQUE)
 
 
 def test_a_name_of_several_groups_is_told_apart_by_the_group(tmp_path: Path) -> None:

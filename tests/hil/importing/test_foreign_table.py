@@ -14,6 +14,7 @@ from foreign_axis import LEAD_M, answered, axis, renamed, write
 from hil.errors import InputError
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
+from hil.importing.foreign_table import read_table
 from hil.importing.map_draft import MapDraft
 from hil.importing.map_text import map_text
 from hil.recording.recording import Recording

@@ -6,7 +6,9 @@ It says "ready" on its standard output when it listens, and ends when its standa
 that started it. It shares nothing with that program: a slow disk delays the log alone.
 """
 
+import os
 import select
+import socket
 import sys
 import time
 from pathlib import Path
@@ -20,6 +22,8 @@ from drivers.port import BusError
 
 ENDINGS: Final = (".blf", ".asc", ".log")
 READY: Final = "ready"
+_SO_RCVBUFFORCE: Final = 33  # linux/socket.h
+_BUFFER_BYTES: Final = 16_000_000  # seconds of a full bus of 1 Mbit/s
 _WAIT_S: Final = 0.05  # for a frame, before the standard input is looked at
 _QUIET_S: Final = 0.2  # without a frame, after which a log that is to end is complete
 
@@ -46,11 +50,21 @@ def log(bus: can.BusABC, path: Path) -> int:
                 return frames
 
 
+def widen(bus: can.BusABC) -> None:
+    """Let the kernel keep frames while this process does not run: without, those of 50 ms on a loaded machine."""
+    with socket.socket(fileno=os.dup(bus.fileno())) as same:
+        try:
+            same.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _BUFFER_BYTES)
+        except PermissionError:  # without CAP_NET_ADMIN up to net.core.rmem_max
+            same.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+
+
 def main(interface: str, channel: str, bitrate: str, name: str) -> int:
     """Open the bus and log it; an error is one line on standard error."""
     try:
         bus = open_bus(BusConfig(interface, channel, int(bitrate)))
         with bus:
+            widen(bus)
             log(bus, Path(name))
     except (BusError, OSError, can.CanError) as error:
         print(error, file=sys.stderr)

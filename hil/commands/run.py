@@ -55,7 +55,7 @@ def run(
                 loaded, wanted, folder, profile.stem, virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
                 planned=lambda trajectory: err.print(
                     f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
-    say(result, virtual)
+            say(result, virtual)  # also where the log fails
     if bus_log:
         out.print(f"Log of the bus: {bus_log}")
     if result.outcome.ending is Ending.INTERRUPTED:

@@ -6,7 +6,7 @@ formats              mdf_file, mcap_file, csv_file, mat_file, hdf5_file         
 layout of a viewer   plotjuggler                                                 XML
 choice of a format   export                                                      `export_recording`
 back                 own_file                                                    `Recording`
-frames of a bus      bus_log                                                     `Recording`
+frames of a bus      can_frames, bus_log                                         `Recording`
 
 Foreign files of these formats are read by `hil.importing`; an own one is known by its metadata.
 """

@@ -23,7 +23,7 @@ def read_exported(path: Path) -> Recording | None:
 
     Raises InputError: damaged, metadata or columns that are no recording, a library that is not installed.
     """
-    if path.suffix.lower() not in WRITERS or not is_file(path):
+    if path.suffix.lower() not in WRITERS or not is_file(path) or not path.stat().st_size:
         return None
     check_foreign(path)
     if path.suffix.lower() == ".csv":

@@ -1,5 +1,7 @@
 """Read topics of a ULog file (.ulg, PX4) with pyulog, an optional library."""
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,8 @@ def load_ulog(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     Raises InputError: damaged, too many values, or pyulog is not installed.
     """
     library = optional_library(path, "pyulog", "pyulog", "exchange")
-    with parsing(path, "ULog file"), path.open("rb") as raw:
+    # it prints what is damaged
+    with parsing(path, "ULog file"), path.open("rb") as raw, redirect_stdout(sys.stderr):
         topics = library.ULog(raw, disable_str_exceptions=True).data_list
         values = sum(one.data[_STAMP].size * len(one.data) for one in topics)
         check_values(path, values, f"topics of {values} values")

@@ -119,7 +119,8 @@ def measure(run: Recording, ending: str, folder: Path) -> list[str]:
     size = path.stat().st_size + (metadata_path(path).stat().st_size if ending == ".csv" else 0)
     count = len(run.columns)
     return [
-        ending, f"{opened.channels}/{count}", f"{opened.units}/{count}", _yes(back.metadata == run.metadata), _yes(same),
+        ending, f"{opened.channels}/{count}", f"{opened.units}/{count}",
+        _yes(back.metadata == run.metadata), _yes(same),
         f"{size / 1e6:.2f}", f"{written_s - start_s:.2f}", f"{read_s - written_s:.2f}", opened.library,
     ]  # fmt: skip
 

@@ -16,7 +16,7 @@ from command_line import hil, refused
 from patient_bench import patient_bench
 
 from hil.bench.bench_file import Bench
-from hil.errors import FieldError, InputError
+from hil.errors import FieldError, HilError, InputError
 from hil.exchange import can_frames
 from hil.exchange.bus_log import import_bus_log, sync_rows
 from hil.exchange.can_frames import BusFrames, read_frames
@@ -201,6 +201,21 @@ def test_wrong_arguments_are_refused(tmp_path: Path, bench: Bench) -> None:
     ):
         with pytest.raises(error, match=told), log_bus(of, tmp_path / name):
             pass
+
+
+def test_a_log_that_fails_is_told_and_ends_nothing_else(tmp_path: Path, bench: Bench) -> None:
+    assert bench.drive is not None
+    away = bench.model_copy(update={"drive": bench.drive.model_copy(update={"channel": "10.0.0.1"})})
+    with (
+        pytest.raises(HilError, match=r"the bus cannot be logged: bus udp_multicast:10.0.0.1: cannot be opened"),
+        log_bus(away, tmp_path / "a.blf"),
+    ):
+        pass
+    full, reached = tmp_path / "full.asc", False
+    full.symlink_to("/dev/full")
+    with pytest.raises(HilError, match=r"log of the bus is not complete: .*No space left"), log_bus(bench, full):
+        reached = True
+    assert reached
 
 
 def test_the_commands_log_and_import(tmp_path: Path, bench: Bench) -> None:

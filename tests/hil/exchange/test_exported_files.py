@@ -87,6 +87,14 @@ def test_hdf5_has_a_dimension_of_time(ending: str, folder: Path) -> None:
         np.testing.assert_array_equal(torque[()], RUN["torque_n_m"])
 
 
+def test_a_unit_that_was_changed_is_refused(folder: Path) -> None:
+    export_recording(RUN, folder / "run.csv")
+    beside = folder / "run.csv-metadata.json"
+    beside.write_text(beside.read_text().replace('"schema:unitText": "N m"', '"schema:unitText": "mN m"', 1))
+    with pytest.raises(InputError, match="torque_command_n_m: given in mN m, allowed N m"):
+        read_exported(folder / "run.csv")
+
+
 @pytest.mark.parametrize("ending", [pytest.param(".mcap", marks=needs(".mcap"))])
 def test_mcap_has_a_message_per_row_at_its_instant(ending: str, folder: Path) -> None:
     from mcap.reader import make_reader

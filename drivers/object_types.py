@@ -35,10 +35,14 @@ def profile_type(index: int, subindex: int, data_type: int) -> int:
     """Type of an object with the sign that its profile fixes; any other object and type as it is."""
     if data_type not in datatypes.INTEGER_TYPES or not (index in _KNOWN or index in _PDO_PARAMETERS):
         return data_type
-    signed = (index, subindex) in _SIGNED or index in COUNTERS
-    kinds = datatypes.SIGNED_TYPES if signed else datatypes.UNSIGNED_TYPES
+    kinds = datatypes.SIGNED_TYPES if is_signed(index, subindex) else datatypes.UNSIGNED_TYPES
     found: int = next(kind for kind in kinds if _SIZES[kind] == _SIZES[data_type])
     return found
+
+
+def is_signed(index: int, subindex: int) -> bool:
+    """True for an object of the profiles that is read as a signed integer."""
+    return (index, subindex) in _SIGNED or index in COUNTERS
 
 
 def size_of(data_type: int) -> int:

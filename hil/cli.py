@@ -21,6 +21,7 @@ from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
 from hil.commands.explain import explain
+from hil.commands.export import export
 from hil.commands.friction import friction
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
@@ -66,6 +67,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("recover", recover),
     ("explain", explain),
     ("import", import_),
+    ("export", export),
     ("identify", identify),
     ("compare", compare),
     ("diagnose", diagnose),

@@ -1,19 +1,25 @@
 """hil import."""
 
+from __future__ import annotations
+
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hil.report.console import err, out
+
+if TYPE_CHECKING:
+    from hil.recording.recording import Recording
 
 
 def import_(
     source: Annotated[
         Path,
         typer.Argument(
-            help="Foreign recording: text such as .csv, .mat, .npy, .npz, .mf4, .xml, .parquet or .json.",
+            help="Foreign recording: text such as .csv, .mat, .npy, .npz, .mf4, .mcap, .h5, .tdms, .ulg, .xml, .json, "
+            ".parquet; or a file of hil export.",
             show_default=False,
         ),
     ],
@@ -40,6 +46,13 @@ def import_(
             help="Number or letter of the axis in the names of columns, of a file with several.", show_default=False
         ),
     ] = None,
+    bench: Annotated[
+        str | None,
+        typer.Option(
+            help="Bench file or name of a shipped bench, for the log of its CAN bus: .blf, .asc or .log.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
     from hil.errors import InputError
@@ -47,6 +60,14 @@ def import_(
     from hil.recording.recording import CLOCK_NOTES, write_parquet
 
     target = target or Path(f"{source.stem}.parquet")
+    if map_file is None and rate_hz is None and axis is None:
+        known = _without_a_map(source, bench)
+        if known is not None:
+            write_parquet(known, target)
+            out.print(f"{len(known)} rows, {known.period_s:g} s each\nRecording: {target}")
+            return
+    elif bench is not None:
+        raise InputError("import: given --bench and --map, --rate or --axis, allowed one of them; leave the others out")
     drafted = map_file is None
     if map_file is None:
         map_file = str(_drafted(source, target, rate_hz, axis))
@@ -66,6 +87,21 @@ def import_(
     for channel, how in recording.metadata["derived"].items():
         out.print(f"  {channel}: {how}")
     out.print(f"Recording: {target}")
+
+
+def _without_a_map(source: Path, bench: str | None) -> Recording | None:
+    """The recording of a file that needs no map: the log of a bus, an exported one; None for another one."""
+    from hil.errors import InputError
+    from hil.exchange.bus_log import import_bus_log
+    from hil.exchange.own_file import read_exported
+
+    if bench is not None:
+        from hil.bench.bench_file import load_bench
+
+        return import_bus_log(source, load_bench(bench))
+    if source.suffix.lower() == ".blf":
+        raise InputError(f"{source}: is the log of a CAN bus; say whose: hil import {source} --bench BENCH")
+    return read_exported(source)
 
 
 def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:

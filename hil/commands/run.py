@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,6 +24,13 @@ def run(
     reset_fault: ResetFault = False,
     seed: Seed = None,
     folder: Out = None,
+    bus_log: Annotated[
+        Path | None,
+        typer.Option(
+            help="Log the bus from another process: .blf, .asc or .log (candump). hil import reads it.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Run a profile on a bench and record it. ctrl-C: controlled stop; again: stop by the drive's ramp.
 
@@ -32,6 +39,7 @@ def run(
     from hil.commands.warm_up import compile_kernels
     from hil.errors import HilError
     from hil.files.output import default_folder
+    from hil.loop.bus_log import log_bus
     from hil.loop.run import run_profile
     from hil.loop.simulated_bench import load_simulated
     from hil.loop.supervision import Ending
@@ -42,11 +50,14 @@ def run(
     with named(bench, profile):
         wanted = load_profile(profile)
         compile_kernels()
-        result = run_profile(
-            loaded, wanted, folder, profile.stem, virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
-            planned=lambda trajectory: err.print(
-                f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
-    say(result, virtual)
+        with log_bus(loaded, bus_log) if bus_log else nullcontext():
+            result = run_profile(
+                loaded, wanted, folder, profile.stem, virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
+                planned=lambda trajectory: err.print(
+                    f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
+            say(result, virtual)  # also where the log fails
+    if bus_log:
+        out.print(f"Log of the bus: {bus_log}")
     if result.outcome.ending is Ending.INTERRUPTED:
         raise typer.Exit(130)
     if not result.complete:

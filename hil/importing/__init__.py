@@ -4,7 +4,9 @@ step                 modules                                                    
 text to rows         number_form, cell_units, text_lines, text_rows              `TextRows`
                      encodings, header_rows, csv_dialect (for the draft)         `Header`, `CsvDialect`
 rows of one value    series_columns (which columns), series (put together)       `SeriesColumns`, `SeriesRows`
-file to variables    mat_size, mat_file, mdf_file, variables                     arrays by name
+file to groups       mdf_file, hdf5_file, mcap_file, tdms_file, ulog_file        `Group`: channels of one clock
+groups to variables  channel_groups                                              arrays by name, of one length
+file to variables    mat_size, mat_file, variables                               arrays by name
 file to records      long_text, records; hil.files.json_columns, xml_records     `Records`
 file to table        row_groups, foreign_table (all columns)                     `ForeignTable`
                      foreign_columns (those that a map names)                    `Foreign`

@@ -59,7 +59,7 @@ def _structures(value: Any) -> list[Any]:
 
 def mat_column(path: Path, variables: dict[str, Any], name: str) -> FloatArray:
     """The vector `name`, or column i of the matrix of NAME[i] (n,). Raises InputError for another shape or type."""
-    match = re.fullmatch(r"(.+)\[(\d+)\]", name)
+    match = None if name in variables else re.fullmatch(r"(.+)\[(\d+)\]", name)
     values = _mat_variable(path, variables, match[1] if match else name)
     if match and values.ndim == 2 and int(match[2]) < values.shape[1]:
         return np.ascontiguousarray(values[:, int(match[2])])

@@ -5,37 +5,48 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from hil.errors import InputError
+import numpy as np
+
 from hil.files.input_file import MOST_BYTES, check_values, inflated, parsing
+from hil.files.optional_library import optional_library
+from hil.importing.channel_groups import CLOCK, Group, one_length
 
 
 def load_mdf(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """Channels of a file and their units, with the clock of each group: "time", of the groups after the first "time 2".
+    """Channels of a file and their units, as `one_length` gives them; attachments of JSON as texts.
 
     Raises InputError: damaged, too many values, or asammdf is not installed.
     """
-    try:
-        from asammdf import MDF
-        from asammdf.blocks.mdf_v4 import MDF4
-    except ImportError:
-        raise InputError(
-            f"{path}: .mf4 files are read by asammdf, which is not installed; install it: pip install 'hil-servo[mf4]'"
-        ) from None
-    arrays, units = dict[str, Any](), dict[str, str]()
+    library = optional_library(path, "asammdf", "asammdf", "mf4")
+    blocks = optional_library(path, "asammdf.blocks.mdf_v4", "asammdf", "mf4")
     check_mdf_size(path)
-    MDF4.__del__ = _close
+    blocks.MDF4.__del__ = _close
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
-    with parsing(path, "MDF 4 file"), MDF(path) as file:
+    with parsing(path, "MDF 4 file"), library.MDF(path) as file:
         groups = [group for group in file.groups if group.channel_group.cycles_nr > 0]
         values = sum(group.channel_group.cycles_nr * len(group.channels) for group in groups)
         check_values(path, values, f"{values} values")
-        for number, index in enumerate(file.virtual_groups, 1):
-            clock = "time" if number == 1 else f"time {number}"
-            for signal in file.select([(None, *place) for place in _places(file, index)], raw=False):
-                arrays[clock] = signal.timestamps
-                arrays[signal.name], units[signal.name] = signal.samples, signal.unit
-            units[clock] = "s"
-    return arrays, {name: unit for name, unit in units.items() if unit}
+        read = [_group(file, number, index) for number, index in enumerate(file.virtual_groups, 1)]
+        texts = {
+            Path(one.file_name).stem: np.array(bytes(file.extract_attachment(index=index)[0]).decode())
+            for index, one in enumerate(file.attachments)
+            if one.mime == "application/json"
+        }
+    arrays, units = one_length(path, read)
+    return arrays | texts, units
+
+
+def _group(file: Any, number: int, index: int) -> Group:
+    """A virtual group, its scaled values with NaN where a sample is marked as invalid."""
+    channels, units = dict[str, Any](), {CLOCK: "s"}
+    for signal in file.select([(None, *place) for place in _places(file, index)], raw=False):
+        channels.setdefault(CLOCK, signal.timestamps)
+        values = signal.samples
+        own = signal.name if signal.name not in channels else f"{signal.name} {len(channels)}"
+        if signal.invalidation_bits is not None and values.dtype.kind in "fiub":
+            values = np.where(np.asarray(signal.invalidation_bits, dtype=bool), np.nan, values.astype(np.float64))
+        channels[own], units[own] = values, signal.unit
+    return Group(file.groups[index].channel_group.acq_name or f"group {number}", channels, units)
 
 
 def _close(file: Any) -> None:

@@ -37,7 +37,7 @@ class Stated:
         own = self.units
         texts = [f"{name}: {text}" for name, text in self.texts.items()]
         for name, values in (columns or {}).items():
-            if np.isfinite(values).all() and np.ptp(values) == 0.0:
+            if values.size and np.isfinite(values).all() and np.ptp(values) == 0.0:
                 unit = (units or {}).get(name)
                 texts.append(f"{name}{f' [{unit}]' if unit else ''}: {values[0]:.12g}")
         sized = {}

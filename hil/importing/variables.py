@@ -1,6 +1,7 @@
-"""Read files that hold variables by name: MATLAB .mat, NumPy .npy and .npz, ASAM MDF 4 (.mf4)."""
+"""Read files that hold variables by name: MATLAB, NumPy, ASAM MDF 4, HDF5, MCAP, TDMS and ULog."""
 
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,10 +9,26 @@ import numpy as np
 from numpy.lib import format as npy_format
 
 from hil.files.input_file import check_values, parsing
+from hil.importing.hdf5_file import load_hdf5
 from hil.importing.mat_file import load_mat
+from hil.importing.mcap_file import load_mcap
 from hil.importing.mdf_file import load_mdf
+from hil.importing.tdms_file import load_tdms
+from hil.importing.ulog_file import load_ulog
 
-VARIABLE_ENDINGS = (".mat", ".npy", ".npz", ".mf4")
+Loaded = tuple[dict[str, Any], dict[str, str]]
+_LOADERS: dict[str, Callable[[Path], Loaded]] = {
+    ".mat": lambda path: load_hdf5(path) if _is_hdf5(path) else (load_mat(path), {}),
+    ".npy": lambda path: (_numpy(path), {}),
+    ".npz": lambda path: (_numpy(path), {}),
+    ".mf4": load_mdf,
+    ".h5": load_hdf5,
+    ".hdf5": load_hdf5,
+    ".mcap": load_mcap,
+    ".tdms": load_tdms,
+    ".ulg": load_ulog,
+}
+VARIABLE_ENDINGS = tuple(_LOADERS)
 
 
 class Variables(NamedTuple):
@@ -23,18 +40,22 @@ class Variables(NamedTuple):
 
 def load_variables(path: Path) -> Variables:
     """Read `path` by its ending. Raises InputError: damaged, too many values, or a library that is not installed."""
-    match path.suffix.lower():
-        case ".mat":
-            return Variables(load_mat(path), {})
-        case ".npy" | ".npz":
-            with parsing(path, "NumPy file"):
-                return Variables(_numpy(path), {})
-        case _:
-            return Variables(*load_mdf(path))
+    return Variables(*_LOADERS[path.suffix.lower()](path))
+
+
+def _is_hdf5(path: Path) -> bool:
+    """True for a .mat file of version 7.3, which is an HDF5 file behind a head of 512 bytes."""
+    with path.open("rb") as file:
+        return file.read(520)[512:] == b"\x89HDF\r\n\x1a\n"
 
 
 def _numpy(path: Path) -> dict[str, Any]:
     """Arrays of a .npy or .npz file; fields of a structured array as variables. What it says of its size is checked."""
+    with parsing(path, "NumPy file"):
+        return _named_arrays(path)
+
+
+def _named_arrays(path: Path) -> dict[str, Any]:
     found = dict[str, Any]()
     if path.suffix.lower() == ".npy":
         _check_array(path, path.open("rb"))

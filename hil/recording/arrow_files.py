@@ -166,10 +166,15 @@ def stored_values(schema: pa.Schema) -> dict[str, float | str]:
 
 
 def stored_metadata(path: Path, schema: pa.Schema) -> dict[str, Any]:
+    """Metadata of a recording in the schema of its file. Raises InputError as `checked_metadata`."""
+    return checked_metadata(path, (schema.metadata or {}).get(METADATA_KEY, b"{}"))
+
+
+def checked_metadata(path: Path, text: str | bytes) -> dict[str, Any]:
     """Metadata of a recording. Raises InputError where they are no JSON mapping, or a key that is read has another type
     than it is written with."""
     with parsing(path, "recording: its metadata"):
-        metadata = json.loads((schema.metadata or {}).get(METADATA_KEY, b"{}"))
+        metadata = json.loads(text)
         if not isinstance(metadata, dict):
             raise ValueError(f"given {type(metadata).__name__}, allowed a mapping")
         for key, (kind, of) in _KINDS.items():

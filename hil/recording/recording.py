@@ -225,22 +225,31 @@ def _read_stream(path: Path) -> Recording:
 
 def _from_table(path: Path, schema: pa.Schema, table: pa.Table, notes: dict[str, Any]) -> Recording:
     known = _known(path, tuple(schema.names))
-    for name in known:
-        unit, own = stored_unit(schema, name), CHANNELS[name].unit
-        if unit not in (None, own):
-            raise InputError(f"{path}: {name}: given in {unit}, allowed {own}; import it with a map")
+    units = {name: unit for name in known if (unit := stored_unit(schema, name)) is not None}
     # an empty value becomes NaN, which the check refuses with its row
     columns = {name: numbers(path, table, name) for name in known}
-    metadata = stored_metadata(path, schema)
-    metadata.pop(PARTS, None)  # the rows tell
+    notes = _unknown(tuple(schema.names)) | notes
+    return recording_of(path, columns, units, stored_metadata(path, schema) | notes)
+
+
+def recording_of(
+    path: Path, columns: dict[str, FloatArray], units: Mapping[str, str], metadata: dict[str, Any]
+) -> Recording:
+    """The recording whose columns (n,), their units and metadata (with its period) a file of this program holds.
+
+    Raises InputError: a required channel missing, another unit, no clock, a period that is not that of the rows.
+    """
+    for name in _known(path, tuple(columns)):
+        if (unit := units.get(name)) not in (None, own := CHANNELS[name].unit):
+            raise InputError(f"{path}: {name}: given in {unit}, allowed {own}; import it with a map")
+    metadata = {key: value for key, value in metadata.items() if key != PARTS}  # the rows tell
     stored_s = metadata.pop("period_s", None)
     rows = regular_rows(columns, lambda row: f"{path}: row {row + 1}", period_s=stored_s)
     stored_s = rows.period_s if stored_s is None else stored_s
     period_s = rows.period_s if rows.rate_hz else stored_s
     if abs(period_s - rows.period_s) > CLOCK_TOLERANCE * rows.period_s:
         raise InputError(f"{path}: period_s: given {period_s} s, the rows have {rows.period_s:g} s; it is damaged")
-    metadata = clock_metadata(rows) | metadata | _unknown(tuple(schema.names)) | notes
-    return Recording(path.stem, rows.columns, period_s, metadata)
+    return Recording(path.stem, rows.columns, period_s, clock_metadata(rows) | metadata)
 
 
 def _known(path: Path, names: tuple[str, ...]) -> list[str]:

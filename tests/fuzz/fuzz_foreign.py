@@ -8,6 +8,7 @@ import random
 import tempfile
 from pathlib import Path
 
+from channel_files import LIBRARIES
 from dialects import DIALECTS
 from foreign_axis import axis, renamed, write
 from mutations import damaged_bytes, damaged_text
@@ -18,7 +19,6 @@ from hil.importing.map_text import map_text
 
 ROWS = 300
 _TEXTS = ("csv", "txt", "log")
-_LIBRARIES = {"mf4": "asammdf"}
 
 
 @functools.cache
@@ -28,7 +28,7 @@ def _files() -> tuple[tuple[str, bytes], ...]:
     small = renamed(axis(rows=ROWS), t="time_s", angle="motor_angle_rad", torque="torque_Nm", x_set="setpoint_mm")
     with tempfile.TemporaryDirectory() as name:
         for ending, make in DIALECTS.values():
-            if ending in _LIBRARIES and importlib.util.find_spec(_LIBRARIES[ending]) is None:
+            if ending in LIBRARIES and importlib.util.find_spec(LIBRARIES[ending]) is None:
                 continue
             path = Path(name) / f"a.{ending}"
             make(path)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+from channel_files import CHANNEL_FILES
 from foreign_axis import axis
 
 AXIS = axis(rows=3000)
@@ -385,4 +386,5 @@ DIALECTS: dict[str, tuple[str, Callable[[Path], None]]] = {
     "NumPy, matrix .npy": ("npy", numpy_matrix),
     "NumPy, .npz": ("npz", numpy_named),
     "ASAM MDF 4": ("mf4", mdf),
+    **CHANNEL_FILES,
 }

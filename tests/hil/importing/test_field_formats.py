@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from channel_files import LIBRARIES
 from dialects import ANGLE, DIALECTS, TORQUE
 
 from hil.errors import InputError
@@ -24,7 +25,6 @@ WITHOUT_UNITS = {
     "TwinCAT Scope, without a header", "moteus, CSV", "NumPy, matrix .npy", "ROS, ros2 topic echo --csv",
 }  # fmt: skip
 WITHOUT_A_CLOCK = {"LinuxCNC halsampler": 1000.0, "TwinCAT Scope, without a header": 1000.0}
-LIBRARIES = {"mf4": "asammdf"}
 DOCUMENT = Path(__file__).parents[3] / "docs" / "recordings.md"
 
 

@@ -14,6 +14,7 @@ from foreign_axis import LEAD_M, answered, axis, renamed, write
 from hil.errors import InputError
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
+from hil.importing.foreign_table import read_table
 from hil.importing.map_draft import MapDraft
 from hil.importing.map_text import map_text
 from hil.recording.recording import Recording
@@ -261,3 +262,11 @@ def test_more_columns_than_an_axis_has_are_refused(tmp_path: Path) -> None:
         InputError, match="given 1001 columns of numbers, allowed 1000; export the channels of one axis"
     ):
         draft_map(path)
+
+
+def test_a_vector_without_values_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, t=np.arange(10.0), angle=np.arange(10.0), nothing=np.empty(0))
+    table = read_table(path)
+    assert list(table.columns) == ["t", "angle"]
+    assert "nothing: 0 rows, the other columns have 10: another rate, or cut" in table.remarks

@@ -1,0 +1,110 @@
+"""Read datasets of an HDF5 file with h5py, an optional library."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.files.input_file import check_values, parsing
+from hil.files.optional_library import optional_library
+from hil.importing.channel_groups import Group, as_seconds, one_length
+from hil.importing.column_names import label
+from hil.importing.lexicon import Quantity
+
+_UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+_FACTORS, _OFFSETS = ("scale_factor",), ("add_offset",)  # of the conventions CF for netCDF
+_MISSING = ("_FillValue", "missing_value")
+
+
+def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
+    """Datasets and fields of tables by name, texts, and attributes of the root.
+
+    Units, factors and missing values are those of the attributes of a dataset. Links to other files are not followed.
+    Raises InputError: damaged, too many values, or h5py is not installed.
+    """
+    library = optional_library(path, "h5py", "h5py", "exchange")
+    with parsing(path, "HDF5 file"), library.File(path, "r") as file:
+        datasets = list[Any]()
+        file.visititems(lambda name, one: datasets.append(one) if _is_own(library, one) else None)
+        values = sum(one.size * max(1, one.dtype.itemsize // 8) for one in datasets)
+        check_values(path, values, f"datasets of {values} values")
+        groups = dict[str, list[Any]]()
+        for one in datasets:
+            folder = one.parent.name if one.dtype.names is None else one.name
+            if not folder.startswith("/#"):  # what MATLAB refers to by pointers
+                groups.setdefault(folder, []).append(one)
+        read = [group for name, members in groups.items() for group in _groups(library, name, members)]
+        scalars = (str, int, float, np.integer, np.floating)
+        texts = {name: np.array(value) for name, value in file.attrs.items() if isinstance(value, scalars)}
+    arrays, units = one_length(path, read)
+    return texts | arrays, units
+
+
+def _is_own(library: Any, one: Any) -> bool:
+    """True for a dataset whose values are in this file."""
+    return isinstance(one, library.Dataset) and one.shape is not None and not one.external and not one.is_virtual
+
+
+def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
+    """Datasets of one folder: those on its clock, which comes first, and the others."""
+    channels, units = dict[str, Any](), dict[str, str]()
+    for one in datasets:
+        key = one.name.rpartition("/")[2]
+        if library.check_string_dtype(one.dtype) is not None:
+            if one.size == 1:
+                channels[key] = np.array(_text(one[()]))
+            continue
+        read = _matlab(one)
+        given = {key: read} if read.dtype.names is None else {field: read[field] for field in read.dtype.names}
+        for own, values in given.items():
+            channels[own] = _scaled(one.attrs, values)
+            units[own] = next((_text(one.attrs[key]) for key in _UNITS if key in one.attrs), "")
+    rows = {own: len(values) for own, values in channels.items() if values.dtype.kind in "fiub" and values.size > 1}
+    clocks = [own for own in rows if label(own, units.get(own, "")).quantity is Quantity.TIME]
+    on_clock = [own for own in dict.fromkeys([*clocks, *rows]) if clocks and rows[own] == rows[clocks[0]]]
+    on_clock = on_clock if len(on_clock) > 1 else []  # a clock alone is that of other folders
+    rest = [own for own in channels if own not in on_clock]
+    folder = name.strip("/").replace("/", ".") or "root"
+    return [
+        Group(folder, {own: channels[own] for own in names}, units, has_clock)
+        for names, has_clock in ((on_clock, True), (rest, False))
+    ]
+
+
+def _matlab(dataset: Any) -> Any:
+    """Values of a dataset; those of MATLAB (.mat of version 7.3) are transposed, and its texts are numbers."""
+    kind = _text(dataset.attrs.get("MATLAB_class", ""))
+    values = dataset[()]
+    if kind == "char":
+        return np.array("".join(map(chr, np.asarray(values).T.reshape(-1))))
+    return np.asarray(values).T if kind else values
+
+
+def _scaled(attributes: Any, values: Any) -> Any:
+    """Values with the factor and offset of the attributes, NaN where they say that one is missing."""
+    values = np.asarray(values)
+    if values.dtype.kind == "M":
+        return as_seconds(values)
+    if values.dtype.kind not in "fiub":
+        return values
+    factor, offset = _number(attributes, _FACTORS, 1.0), _number(attributes, _OFFSETS, 0.0)
+    missing = [_number(attributes, (key,), np.nan) for key in _MISSING]
+    bad = np.isin(values, [one for one in missing if np.isfinite(one)])
+    if bad.any():
+        values = np.where(bad, np.nan, values.astype(np.float64))
+    return values if (factor, offset) == (1.0, 0.0) else factor * values.astype(np.float64) + offset
+
+
+def _number(attributes: Any, names: tuple[str, ...], default: float) -> float:
+    for name in names:
+        value = np.asarray(attributes[name]) if name in attributes else np.empty(0)
+        if value.size == 1 and value.dtype.kind in "fiub":
+            return float(value.reshape(-1)[0])
+    return default
+
+
+def _text(value: Any) -> str:
+    """A text, which libraries store as text, bytes, or an array of one of them."""
+    one = np.asarray(value).reshape(-1)
+    first = one[0] if one.size else ""
+    return first.decode(errors="replace") if isinstance(first, bytes) else str(first)

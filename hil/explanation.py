@@ -22,6 +22,7 @@ from hil.diagnosis.time_left import BUDGET_S
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import BenchDraft, draft_bench
 from hil.errors import InputError
+from hil.exchange.own_file import read_exported
 from hil.files.input_file import is_file
 from hil.files.output import rewritten_folder, write_text
 from hil.identification.measured import bench_of
@@ -34,7 +35,6 @@ from hil.recording.recording import Recording, read_recording
 from hil.report.diagnosis_report import write_diagnosis
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
-_OWN = (".parquet", ".arrows", ".csv")  # endings of recordings that need no map
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +83,9 @@ def explain(
     bench, draft, notes = _bench(read, folder / BENCH)
     basis = Basis(tuple(read), bench, draft, (*assumed, *notes))
     first(basis)
-    diagnosis = diagnose(read, (), bench, progress, budget_s)
-    progress("writing the report")
     with rewritten_folder(folder / REPORT, PAGE) as part:
+        diagnosis = diagnose(read, (), bench, progress, budget_s)
+        progress("writing the report")
         write_diagnosis(diagnosis, part, basis.assumed)
     return Explanation(basis, diagnosis, folder / REPORT / PAGE)
 
@@ -93,7 +93,9 @@ def explain(
 def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | None) -> tuple[Recording, list[str]]:
     """A recording of this project as it is, any other file by its map; and what was assumed."""
     path = folder / f"{source.stem}-map.yaml"
-    if source.suffix.lower() in _OWN and not is_file(path):
+    if not is_file(path):
+        if (exported := read_exported(source)) is not None:
+            return exported, []
         with suppress(InputError):  # a foreign file
             return read_recording(source), []
     notes = [f"{path}: used as it is"]

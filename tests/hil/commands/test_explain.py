@@ -1,0 +1,119 @@
+"""hil explain: from a file to a page, in a folder whose map and bench are taken up again."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import hil
+from diagnosis_runs import SEGMENTS, bench, moves, recorded
+from foreign_axis import COULOMB_N_M, INERTIA_KG_M2, axis
+
+from hil.recording.recording import write_parquet
+
+FOLDER = "explained-axis"
+
+
+def written(folder: Path, unit: str = "[Nm]", factor: float = 1.0) -> Path:
+    """A text file of an axis: time, angle and torque, the latter with this unit."""
+    columns = axis(2500)
+    path = folder / "axis.csv"
+    rows = np.column_stack([columns["t"], columns["angle"], factor * columns["torque"]])
+    np.savetxt(path, rows, delimiter=",", header=f"time [s],angle [rad],torque {unit}", comments="", fmt="%.9g")
+    return path
+
+
+def printed(out: str, name: str) -> float:
+    """Value that the table of the bench gives a parameter."""
+    found = re.search(rf"^{name} +(\S+)", out, flags=re.MULTILINE)
+    assert found, out
+    return float(found.group(1))
+
+
+@pytest.fixture(scope="module")
+def explained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+    """Folder of a first explanation, and what it printed."""
+    folder = tmp_path_factory.mktemp("explain")
+    ran = hil(folder, "explain", written(folder).name, "--budget", "10")
+    assert ran.returncode == 0, ran.stderr
+    return folder, ran.stdout, ran.stderr
+
+
+def test_one_command_writes_map_bench_and_page(explained: tuple[Path, str, str]) -> None:
+    folder, out, err = explained
+    names = {path.name for path in (folder / FOLDER).iterdir()}
+    assert names == {"axis-map.yaml", "bench.yaml", "report"}
+    page = (folder / FOLDER / "report" / "report.html").read_text()
+    assert "What was assumed" in page
+    assert "axis-map.yaml: which column is what" in page
+    assert printed(out, "inertia_kg_m2") == pytest.approx(INERTIA_KG_M2, rel=0.02)
+    assert f"Report: {FOLDER}/report/report.html" in out
+    assert "bench.yaml: masses, friction, lead, gains, encoders" in err
+
+
+def test_the_first_answer_comes_before_the_search(explained: tuple[Path, str, str]) -> None:
+    _, out, _ = explained
+    assert out.index("coulomb_torque_n_m") < out.index("noise floor")
+
+
+def test_a_corrected_bench_is_taken_up_again(explained: tuple[Path, str, str]) -> None:
+    folder, _, _ = explained
+    bench = folder / FOLDER / "bench.yaml"
+    before = bench.read_text()
+    mended = re.sub(r"(coulomb_torque_n_m: )\S+", r"\g<1>0.5", before)
+    bench.write_text(mended)
+    try:
+        ran = hil(folder, "explain", "axis.csv", "--budget", "10")
+        assert ran.returncode == 0, ran.stderr
+        assert bench.read_text() == mended
+        assert "bench.yaml: used as it is" in ran.stderr
+        assert "axis-map.yaml: used as it is" in ran.stderr
+        found = json.loads((folder / FOLDER / "report" / "diagnosis.json").read_text())
+        coulomb = found["parameter_corrections"]["coulomb_torque_n_m"]
+        assert coulomb["nominal"] == 0.5
+        assert coulomb["value"] == pytest.approx(COULOMB_N_M, rel=0.02)
+    finally:
+        bench.write_text(before)
+
+
+def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path: Path) -> None:
+    """The torque in tenths of something: inertia and friction are ten times the true ones, and it is told."""
+    written(tmp_path, "", 10.0)
+    ran = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
+    assert ran.returncode == 0, ran.stderr
+    assert "torque_n_m: its numbers count as N m" in ran.stderr
+    assert printed(ran.stdout, "inertia_kg_m2") == pytest.approx(10.0 * INERTIA_KG_M2, rel=0.02)
+    assert "its numbers count as N m" in (tmp_path / FOLDER / "report" / "report.html").read_text()
+
+
+def test_a_file_that_cannot_be_read_leaves_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "axis.csv").write_text("nothing\nhere\n")
+    ran = hil(tmp_path, "explain", "axis.csv")
+    assert ran.returncode == 2
+    assert "axis.csv" in ran.stderr
+    assert not (tmp_path / FOLDER).exists()
+
+
+def test_a_folder_of_the_user_is_not_replaced(tmp_path: Path) -> None:
+    written(tmp_path)
+    kept = tmp_path / FOLDER / "report" / "mine.txt"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("mine")
+    ran = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
+    assert ran.returncode == 2
+    assert "report: exists and is not empty" in ran.stderr
+    assert kept.read_text() == "mine"
+
+
+def test_a_run_of_a_bench_needs_neither_map_nor_draft(tmp_path: Path) -> None:
+    owner = bench()
+    run = recorded(owner, profile=moves(SEGMENTS[:5], 2))
+    write_parquet(replace(run, metadata={"bench": owner.model_dump(mode="json")}), tmp_path / "run.parquet")
+    ran = hil(tmp_path, "explain", "run.parquet", "--budget", "5")
+    assert ran.returncode == 0, ran.stderr
+    assert {path.name for path in (tmp_path / "explained-run").iterdir()} == {"report"}
+    assert "the bench with which it was recorded" in ran.stderr

@@ -33,6 +33,6 @@ def test_a_switch_is_no_torque(tmp_path: Path) -> None:
     """It follows the direction as Coulomb friction does."""
     columns = axis()
     table = {"time_s": columns["t"], "position_rad": columns["angle"], "state": np.sign(columns["speed"])}
-    draft = draft_map(write(tmp_path / "axis.csv", table | {"q1": columns["torque"]}))
-    assert column_of(draft, "torque_n_m") == "q1"
+    draft = draft_map(write(tmp_path / "axis.csv", table | {"zeta": columns["torque"]}))
+    assert column_of(draft, "torque_n_m") == "zeta"
     assert "state" in draft.left_out

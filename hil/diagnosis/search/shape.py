@@ -53,13 +53,14 @@ def chance_below_noise(fit: Fit, without: Fit) -> float | None:
 def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     """Probability that chance makes the shape of one of all mechanisms in what the fit without it leaves.
 
-    By the number of values that were searched, see `_searched`. 1 where nothing tells, for a `fitted` shape of the
-    opposite sign, and for less than what correct simulations of one axis differ by.
+    By the number of values that were searched, see `_searched`. 1 where nothing tells, for less than what correct
+    simulations of one axis differ by, and for a `fitted` shape that leaves more at its own size: of the size c the term
+    has 1, and removes (2 c - 1) / c^2 of what the shape removes.
     """
     asked, best = _asked(without), 1.0
     if asked is None:
         return best
-    searched, shaped = _searched(fit) - _searched(without), _faint(fit, without)
+    searched, (shaped, share) = _searched(fit) - _searched(without), _faint(fit, without)
     for channel, own in asked.channels.items():
         after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
         shape = own.quiet - after
@@ -67,24 +68,31 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
             continue
         size, ratio, free = _first_coefficient(np.column_stack([shape, own.beside]), own.measured, own.rows)
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
-            chance = student.sf(ratio if fitted else abs(ratio), free) * (1.0 if fitted else 2.0)
+            if fitted:
+                removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
+                chance = student.sf(abs(ratio) * removes**0.5, free)
+            else:
+                chance = 2.0 * student.sf(abs(ratio), free)
             best = min(best, len(LIBRARY) * free**searched * float(chance))
     return best
 
 
-def _faint(fit: Fit, without: Fit) -> Hypothesis:
-    """The fit without it and little of the friction that its term adds, if it does: of more the twin would stick."""
+def _faint(fit: Fit, without: Fit) -> tuple[Hypothesis, float]:
+    """The fit, or the one without its term and little of the friction that it adds: of more the twin would stick.
+
+    With the share of the term's strength.
+    """
     known = {term.key for term in without.terms}
     added = [term for term in fit.terms if term.key not in known]
     mechanism = BY_ID[added[-1].effect] if added else None
     if mechanism is None or mechanism.variants[added[-1].variant].stage is not Stage.COULOMB:
-        return fit.hypothesis
+        return fit.hypothesis, 1.0
     values, none = list(added[-1].values), 0.0
     if mechanism.neutral is not None:
         none = mechanism.neutral(axis_facts(without.bench, without.data.runs))
     for index in mechanism.indices(Role.STRENGTH):
         values[index] = none + _FAINT * (values[index] - none)
-    return without.hypothesis.with_term(replace(added[-1], values=tuple(values)))
+    return without.hypothesis.with_term(replace(added[-1], values=tuple(values))), _FAINT
 
 
 class _Seen(NamedTuple):

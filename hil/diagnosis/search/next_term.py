@@ -99,5 +99,8 @@ def first_standing(additions: Sequence[Addition]) -> Addition | None:
 
 
 def ordered(additions: Sequence[Addition]) -> list[Addition]:
-    """Additions, best first: by what they leave; below the noise by the chance of their shape."""
-    return sorted(additions, key=lambda one: (one.chance or 0.0, one.fit.cost))
+    """Additions, best first: by their evidence; below the noise by the chance of their shape.
+
+    Of what another effect leaves, slow and large, a wrong term may remove more energy than the right one.
+    """
+    return sorted(additions, key=lambda one: (one.chance or 0.0, -one.evidence))

@@ -56,7 +56,7 @@ def together(base: Fit, fit: Fit, other: Term) -> list[Fit]:
     given = base.hypothesis.moved(given_points(base)[0]).with_term(other)
     beside = base.estimator.fit(given, evaluations=_SECOND, fixed=range(given.nominal_count))
     alike = [one for one in screen_library(beside) if BY_ID[one.term.effect].search.beside == other.effect]
-    likely = [one for one in alike if one.share > 0.0]
+    likely = [one for one in alike if one.score > 0.0]
     return race(beside, likely) if likely else []
 
 

@@ -1,4 +1,4 @@
-"""Score tests: share of the residual energy that each mechanism of the library would explain.
+"""Score tests: evidence that each mechanism of the library promises, by the energy that it would explain.
 
     minimise over a, c:  | W (r + J a + D c) |^2
 
@@ -20,7 +20,7 @@ from hil.diagnosis.search.events import EVENTS, event_term
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import whitened, whitening
+from hil.identification.inference import BLUR, correlation_time, whitened, whitening
 from hil.identification.parallel import POOL
 from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
@@ -36,15 +36,15 @@ _OTHERS = 6  # starts of one mechanism that are kept: limits the evaluations of 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A mechanism to be fitted: its scaled start, and the share of the residual energy that it would explain.
+    """A mechanism to be fitted: its scaled start, and the evidence that a linear step promises.
 
     `others` are starts of the same mechanism at less strength or other values, since large changes act nonlinearly.
-    `own` is the share at the values of the term, `share` that at the best strength, `by_channel` the same of each
-    channel alone.
+    `own` is the evidence at the values of the term, `score` that at the best strength, for n independent rows
+    -n log(1 - share of the energy); `by_channel` is the share of each channel alone.
     """
 
     term: Term
-    share: float
+    score: float
     others: tuple[Term, ...] = ()
     own: float = 0.0
     by_channel: Mapping[str, float] = field(default_factory=dict)
@@ -60,6 +60,13 @@ class _View:
     channels: tuple[str, ...]  # of each part
     splits: tuple[int, ...]
     filters: list[FloatArray] | None
+    independent: tuple[float, ...]  # rows of each part
+
+    def evidence(self, left: FloatArray) -> float:
+        """Evidence for what leaves this residual (m,), negative where there is more than before."""
+        parts = (np.split(values, self.splits) for values in (self.residual, left))
+        pairs = ((float(a @ a) + BLUR * a.size, float(b @ b) + BLUR * b.size) for a, b in zip(*parts, strict=True))
+        return sum(rows * float(np.log(a / b)) for rows, (a, b) in zip(self.independent, pairs, strict=True))
 
     def of(self, change: FloatArray) -> FloatArray:
         """Filter, weight and project a change (m,) of the residuals in the same way."""
@@ -78,8 +85,7 @@ class _View:
 
 
 def _view(base: Fit, white: bool) -> _View:
-    residuals, slopes = base.residuals, base.jacobian
-    filters = whitening(base) if white else None
+    residuals, slopes, filters = base.residuals, base.jacobian, whitening(base) if white else None
     seen = residuals.vector if filters is None else whitened(residuals.vector, residuals.splits, filters)
     if filters is not None and slopes.size:
         slopes = whitened(slopes, residuals.splits, filters)
@@ -87,7 +93,8 @@ def _view(base: Fit, white: bool) -> _View:
     nuisance, _ = qr(weights[:, None] * slopes, mode="economic", overwrite_a=True, check_finite=False)
     residual = weights * seen
     left, channels = residual - nuisance @ (nuisance.T @ residual), tuple(channel for _, channel in residuals.parts)
-    return _View(weights, nuisance, left, channels, residuals.splits, filters)
+    independent = tuple(part.size / (1.0 if white else correlation_time(part)) for part in residuals.parts.values())
+    return _View(weights, nuisance, left, channels, residuals.splits, filters, independent)
 
 
 def _weights(part: FloatArray) -> FloatArray:
@@ -120,19 +127,16 @@ def screen_library(base: Fit) -> list[Candidate]:
     best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
 
     def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
-        slot = free_slot(effect, terms)
-        begun = [
-            replace(term, slot=slot)
-            for term in (same[0].term, *same[0].others, *(other.term for other in same[1:_OTHERS]))
-        ]
+        slot, every = free_slot(effect, terms), (same[0].term, *same[0].others, *(one.term for one in same[1:_OTHERS]))
+        begun = [replace(term, slot=slot) for term in every]
         if not BY_ID[effect].search.proportional:
             begun = [term for term in begun if claimable(term, base.bench, base.data.runs)]
         if not begun or not claimable(begun[0], base.bench, base.data.runs):
             return None
-        return Candidate(begun[0], same[0].share, tuple(begun[1:]), by_channel=_most(one.by_channel for one in same))
+        return Candidate(begun[0], same[0].score, tuple(begun[1:]), by_channel=_most(one.by_channel for one in same))
 
     candidates = [gathered(effect, same) for effect, same in best.items()]
-    return sorted((one for one in candidates if one is not None), key=lambda one: -one.share)
+    return sorted((one for one in candidates if one is not None), key=lambda one: -one.score)
 
 
 def _events(base: Fit) -> list[StartPoint]:
@@ -140,11 +144,9 @@ def _events(base: Fit) -> list[StartPoint]:
     if any(term.windows for term in base.terms):
         return []
     # events may have led the fitted parameters astray, those of the bench file may be wrong
-    points = (base, base.estimator.evaluate(base.hypothesis.given))
+    points, ratio = (base, base.estimator.evaluate(base.hypothesis.given)), base.bench.axis.ratio_m_rad
     shown = [(one, events) for one in points if (events := detect(one))]
-    pairs = [
-        (one, event_term(effect, events, base.bench.axis.ratio_m_rad)) for one, events in shown for effect in EVENTS
-    ]
+    pairs = [(one, event_term(effect, events, ratio)) for one, events in shown for effect in EVENTS]
     terms = [term for _, term in sorted(pairs, key=lambda pair: _criterion(*pair))[:1]]
     return [
         StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
@@ -179,12 +181,12 @@ def _beside_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
 
 
 def _nearest_first(same: Sequence[Candidate]) -> list[Candidate]:
-    """Order the starts of one mechanism by what they explain at their own values, each with the largest share.
+    """Order the starts of one mechanism by what they explain at their own values, each with the largest score.
 
     What a start far from the truth explains at another strength it does not reach: a local minimum lies between.
     """
-    share = max(one.share for one in same)
-    return sorted((replace(one, share=share) for one in same), key=lambda one: -one.own)
+    score = max(one.score for one in same)
+    return sorted((replace(one, score=score) for one in same), key=lambda one: -one.own)
 
 
 def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
@@ -200,18 +202,17 @@ def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
                 values = list(best.term.values)
                 values[index] = min(max(factor * values[index], parameter.low), parameter.high)
                 points.append(StartPoint(mechanism.id, variant, tuple(values), strength=-1))
-        best = max(best, screen(base, points, views)[0], key=lambda one: one.share)
+        best = max(best, screen(base, points, views)[0], key=lambda one: one.score)
     return best
 
 
 def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ()) -> list[Candidate]:
     """Score each start, best first; `views` of the base are made if not given.
 
-    The score is the larger of two: on plain residuals, sensitive to the largest cause, and on whitened residuals,
-    sensitive to a small cause beside a large one.
+    The score is the larger of two, as in `inference.bic_gain`: on plain residuals with their independent rows,
+    sensitive to the largest cause, and on whitened residuals, sensitive to a small cause beside a large one.
     """
-    views = views or [_view(base, False), _view(base, True)]
-    search = replace(base.estimator, fast=True)
+    views, search = views or [_view(base, False), _view(base, True)], replace(base.estimator, fast=True)
     unchanged = search.residuals(base.hypothesis).vector
 
     def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
@@ -222,34 +223,33 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
         directions = [direction(start, values) for values in _directions(start)]
         gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(base.rows)
         found = [scored(start, directions, gone, view) for view in views]
-        best = max(found, key=lambda one: one.share)
-        return replace(best, by_channel=_most(one.by_channel for one in found))
+        best = max(found, key=lambda one: max(one.by_channel.values()))  # of what it explains most it tells its size
+        score, own = (max(values) for values in zip(*((one.score, one.own) for one in found), strict=True))
+        return replace(best, score=score, own=own, by_channel=_most(one.by_channel for one in found))
 
     def scored(start: StartPoint, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
-        energy = float(view.residual @ view.residual)
         without = view.residual + view.of(gone) if start.instead else view.residual
         span = np.stack([view.of(change - gone) for change in directions], axis=1)
         products, target = span.T @ span, -(span.T @ without)
         coefficients = np.asarray(np.linalg.pinv(products, hermitian=True) @ target, dtype=np.float64)
         left = without + span @ coefficients
-        share, by_channel = 1.0 - float(left @ left) / energy, view.explained(left)
+        score, by_channel = view.evidence(left), view.explained(left)
         if start.strength < 0:
             # a start that cannot be scaled is also scored at its own strength
-            whole = float(2.0 * target[0] - products[0, 0]) / energy
-            at_own = view.explained(without + span[:, 0])
+            there = without + span[:, 0]
+            own, at_own = view.evidence(there), view.explained(there)
             if coefficients[0] <= 0.0:
-                share, by_channel = 0.0, at_own
-            by_channel = _most([by_channel, at_own])
-            return Candidate(start.term(), max(share, whole), own=whole, by_channel=by_channel)
+                score, by_channel = 0.0, at_own
+            return Candidate(start.term(), max(score, own), own=own, by_channel=_most([by_channel, at_own]))
         return Candidate(
             start.term(_scaled(start, coefficients)),
-            share,
+            score,
             tuple(start.term(_scaled(start, factor * coefficients)) for factor in _WEAKER),
-            share,
+            score,
             by_channel,
         )
 
-    return sorted(POOL.map(candidate, points), key=lambda one: -one.share)
+    return sorted(POOL.map(candidate, points), key=lambda one: -one.score)
 
 
 def _most(shares: Iterable[Mapping[str, float]]) -> dict[str, float]:

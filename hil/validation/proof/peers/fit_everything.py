@@ -52,7 +52,7 @@ def _weak(candidate: Candidate, start: StartPoint) -> Term:
     values = list(candidate.term.values)
     if start.strength >= 0:
         for n in range(start.harmonics):
-            values[start.strength + 2 * n] *= max(candidate.share, 0.01)
+            values[start.strength + 2 * n] *= max(0.01, *candidate.by_channel.values())
     return replace(candidate.term, values=tuple(values))
 
 

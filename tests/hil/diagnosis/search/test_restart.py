@@ -59,7 +59,7 @@ def test_it_is_fitted_although_the_refit_leaves_next_to_nothing() -> None:
     run = take(recorded(truth, LOST, times=2), owner)
     base = fit_nominal_parameters(prepare_dataset([run], owner))
     assert base.cost < 0.05 * base.estimator.evaluate(base.hypothesis.given).cost
-    assert "preload_loss" not in [one.term.effect for one in screen_library(base) if one.share > 0.01]
+    assert "preload_loss" not in [one.term.effect for one in screen_library(base) if one.score > 0.01 * base.rows]
     found = unbent(base)
     assert found.cost <= base.estimator.evaluate(Hypothesis(truth, (LOST,))).cost < base.cost
     bench, (lost,) = found.hypothesis.resolved

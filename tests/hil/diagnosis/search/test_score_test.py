@@ -23,4 +23,4 @@ def test_the_score_test_finds_a_known_direction_and_its_strength() -> None:
     first, second = screen(base, points)
     assert first.term.effect == "constant_load"
     assert first.term.values[0] == pytest.approx(0.05, rel=0.1)
-    assert first.share > 10.0 * second.share
+    assert first.score > 10.0 * second.score

@@ -6,6 +6,7 @@ that are no longer needed are removed: a first term may have imitated two causes
 
 import math
 import time
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,7 +18,7 @@ from hil.diagnosis.ledger import Considered, accepted, examine
 from hil.diagnosis.search.addition import removed
 from hil.diagnosis.search.events import beside_loads, revised
 from hil.diagnosis.search.initial_values import axis_facts, claimable
-from hil.diagnosis.search.next_term import SearchRound, next_term
+from hil.diagnosis.search.next_term import Additions, SearchRound, first_standing, next_term
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
@@ -48,6 +49,41 @@ class Need:
     evidence: float
     removed: float
     chance: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Added:
+    """The fit after a term was added and what is not needed was removed, the need of its terms, and its rivals."""
+
+    fit: Fit
+    needed: dict[Key, float]
+    rivals: dict[Key, list[RivalFit]]
+
+
+def _added(
+    additions: Additions, round_: SearchRound, nominal: Fit, tried: Collection[Sequence[tuple[str, int]]]
+) -> tuple[_Added | None, list[Considered]]:
+    """Add the best of the terms that stand; one that is removed again gives its place to the next.
+
+    None where all are removed again, or lead to what was `tried`. Returns the ledgers too.
+    """
+    best, left, considered = additions.best, additions.fits, list[Considered]()
+    while best is not None:
+        choice = chosen(best, left, round_)
+        considered += choice.considered
+        effect = choice.named.fit.terms[-1].effect
+        fit, needed, pruned = _pruned(choice.named.fit, round_.reference)
+        considered += pruned
+        # to convergence: the residual of an unfinished fit resembles other mechanisms
+        fit = fit.refit(ENDED, slopes=fit.jacobian)
+        considered += [Considered.of(fit.terms, examine(VALUES, False, CRITERIA), index) for index in _invalid(fit)]
+        fit = revised(claimed(fit))
+        better = not fit.terms and fit.cost < nominal.cost - CRITERIA.evidence
+        if better or effects(fit.terms) not in tried:
+            return _Added(fit, needed, {choice.named.fit.terms[-1].key: choice.rivals}), considered
+        left = [one for one in left if one.fit.terms[-1].effect != effect]
+        best = first_standing(left)
+    return None, [*considered, *(one.considered for one in left)]
 
 
 def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_s: float = math.inf) -> Searched:
@@ -86,8 +122,9 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         additions = next_term(round_, screen_library(base), step)
         fitted = {one.fit.terms[-1].effect for one in additions.fits if not base.estimator.expired}
         considered += additions.considered
-        if additions.best is None:
-            considered += [one.considered for one in additions.fits]
+        added, more = _added(additions, round_, nominal, tried)
+        considered += more
+        if added is None:
             factors = unexplained_channels(base)
             if not factors:
                 break
@@ -95,21 +132,12 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
             louder = base.data.louder(factors)
             base, nominal, given = (over(louder, one) for one in (base, nominal, given))
             continue
-        choice = chosen(additions.best, additions.fits, round_)
-        considered += choice.considered
-        rivals[choice.named.fit.terms[-1].key] = choice.rivals
         del additions  # their residuals are not needed any more
-        best, needed, pruned = _pruned(choice.named.fit, round_.reference)
-        considered += pruned
-        # to convergence: the residual of an unfinished fit resembles other mechanisms
-        best = best.refit(ENDED, slopes=best.jacobian)
-        considered += [Considered.of(best.terms, examine(VALUES, False, CRITERIA), index) for index in _invalid(best)]
-        base = revised(claimed(best))
-        if not base.terms and base.cost < nominal.cost - CRITERIA.evidence:
+        base, needed = added.fit, added.needed
+        rivals |= added.rivals
+        if not base.terms:
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
-        if effects(base.terms) in tried:
-            break  # the term that was added has been removed again
         tried.append(effects(base.terms))
         if len(base.terms) >= CRITERIA.in_vain and mismatch_left(nominal, base, base.data) > CRITERIA.most_left:
             break

@@ -1,0 +1,65 @@
+// Points on the page: those of the rows that roll or rest, and those of the second recording.
+
+export class Store {
+  constructor() { this.clear(); }
+
+  clear() {
+    this.names = []; this.rows = [new Float64Array()]; this.zero = 0; this.still = false; this.window = 0;
+    this.second = null;
+  }
+
+  view(frame) {
+    this.names = frame.traces; this.rows = frame.rows; this.zero = frame.zero_s; this.still = frame.still;
+    this.window = frame.window_s ?? 0;
+    if (!frame.still) this.second = null;
+  }
+
+  append(frame) {
+    if (this.still || frame.traces.join() !== this.names.join()) return;
+    const times = this.rows[0], come = frame.rows[0];
+    const oldest = come[come.length - 1] - this.window;
+    let drop = 0;
+    while (drop < times.length && times[drop] < oldest) drop += 1;
+    this.rows = this.rows.map((row, index) => {
+      const joined = new Float64Array(row.length - drop + come.length);
+      joined.set(row.subarray(drop));
+      joined.set(frame.rows[index], row.length - drop);
+      return joined;
+    });
+  }
+
+  // Time axis as drawn: from the trigger on, if there is one.
+  get range() {
+    const times = this.rows[0];
+    if (!times.length) return [0, this.window || 1];
+    const last = times[times.length - 1] - this.zero;
+    if (this.still) return [times[0] - this.zero, Math.max(last, times[0] - this.zero + 1e-9)];
+    return [last - this.window, last];
+  }
+
+  // Data of uPlot for traces in the unit with this factor; those of the second recording follow.
+  data(names, factor) {
+    const pick = (rows, all) => {
+      const at = (name) => rows[1 + all.indexOf(name)];
+      const scaled = (row) => (factor === 1 ? row : row.map((value) => value * factor));
+      const times = this.zero ? rows[0].map((time) => time - this.zero) : rows[0];
+      return [times, ...names.map((name) => (all.includes(name) ? scaled(at(name)) : new Array(times.length).fill(null)))];
+    };
+    const first = pick(this.rows, this.names);
+    return this.second ? uPlot.join([first, pick(this.second.rows, this.second.traces)]) : first;
+  }
+
+  largest(names) {
+    let most = 0;
+    for (const name of names) {
+      const at = this.names.indexOf(name);
+      if (at >= 0) for (const value of this.rows[1 + at]) most = Math.max(most, Math.abs(value));
+    }
+    return most;
+  }
+
+  last(name) {
+    const row = this.rows[1 + this.names.indexOf(name)];
+    return this.names.includes(name) && row.length ? row[row.length - 1] : undefined;
+  }
+}

@@ -9,6 +9,8 @@ import typer
 
 from hil.report.console import err, out
 
+SCOPE_PORT = 8765
+
 
 def scope(
     recordings: Annotated[
@@ -20,12 +22,16 @@ def scope(
     host: Annotated[str, typer.Option(help="Address to listen at. Any but this computer's own asks for a token.")] = (
         "127.0.0.1"
     ),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free one.")] = 8765,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free one.")] = SCOPE_PORT,
     folder: Annotated[Path, typer.Option("--out", help="Folder for what is saved.")] = Path("runs"),
+    beside: Annotated[
+        int | None, typer.Option(min=1, help="End when this process has ended and no page is open any more.")
+    ] = None,
 ) -> None:
     """Show a run as it goes on, or recordings, in a browser. It only reads: no page has a way to the axis."""
     import os
     import secrets
+    import sys
 
     from hil.commands.runs import read_run
     from hil.errors import InputError
@@ -52,5 +58,7 @@ def scope(
     listening = bound(host, port)
     os.nice(10)  # a scope gives way to all else
     out.print(f"scope: {address(listening, token)}")
-    err.print("ctrl-C ends it")
-    serve(ScopeServer(make_session, folder if own else None, token), listening)
+    sys.stdout.flush()  # also where it is read by another program
+    if beside is None:
+        err.print("ctrl-C ends it")
+    serve(ScopeServer(make_session, folder if own else None, token), listening, beside)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import socket
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -31,6 +32,7 @@ from hil.scope.save import save
 RATE_HZ = 30.0
 STATIC = Path(__file__).parent / "static"
 MOST_PAGES = 16
+UNWATCHED_S = 30.0  # that somebody has to open the page after a short run
 MOST_WAITING = 100  # messages of a page that are not taken yet: more come from no human
 
 
@@ -155,8 +157,8 @@ def address(listening: socket.socket, token: str) -> str:
     return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
 
 
-def serve(server: ScopeServer, listening: socket.socket) -> None:
-    """Serve until ctrl-C or SIGTERM."""
+def serve(server: ScopeServer, listening: socket.socket, beside: int | None = None) -> None:
+    """Serve until ctrl-C or SIGTERM, or until the process `beside` has ended and no page was open for UNWATCHED_S."""
     config = uvicorn.Config(
         server.app(),
         log_level="warning",
@@ -165,5 +167,21 @@ def serve(server: ScopeServer, listening: socket.socket) -> None:
         ws_max_size=1 << 16,
         timeout_graceful_shutdown=1,
     )
+    running = uvicorn.Server(config)
+
+    async def end_unwatched() -> None:
+        watched_s = time.monotonic()
+        while time.monotonic() - watched_s < UNWATCHED_S:
+            await asyncio.sleep(0.5)
+            if server.pages or Path(f"/proc/{beside}").exists():
+                watched_s = time.monotonic()
+        running.should_exit = True
+
+    async def serving() -> None:
+        watch = asyncio.create_task(end_unwatched()) if beside else None
+        await running.serve(sockets=[listening])
+        if watch is not None:
+            watch.cancel()
+
     with suppress(KeyboardInterrupt):  # uvicorn raises it again when it has closed
-        uvicorn.Server(config).run(sockets=[listening])
+        asyncio.run(serving())

@@ -1,10 +1,11 @@
-"""What one open page sees: rows that roll, a stretch at rest, or a capture of the trigger. No network, no clock.
+"""What one open page sees: rows that roll, a stretch at rest, or a capture of the trigger. It knows no network.
 
 `step` takes the messages of the page and returns what is to be sent. It is called 30 times a second.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -35,7 +36,9 @@ class PageSession:
         live: Callable[[], RingRows | None] | None = None,
         recordings: Sequence[FixedRows] = (),
         about: dict[str, Any] | None = None,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
+        self._now_s = now_s  # of a replay
         self._live, self._recordings, self._about = live, tuple(recordings), about or {}
         self._second = traces_of(recordings[1].channels, recordings[1].metadata) if len(recordings) > 1 else {}
         self._rows: ScopeRows | None = None
@@ -193,7 +196,9 @@ class PageSession:
             raise InputError("play: given a run that goes on, allowed a recording: hil scope RECORDING")
         recording = self._recordings[0]
         begin = recording.number_at(message.from_s)
-        self._begin(ReplayedRows(recording, begin if begin < recording.end else recording.first, message.speed))
+        self._begin(
+            ReplayedRows(recording, begin if begin < recording.end else recording.first, message.speed, self._now_s)
+        )
 
     # -- drawing ------------------------------------------------------------------------------------------------------
 

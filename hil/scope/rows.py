@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -153,7 +152,7 @@ class RingRows:
 class ReplayedRows:
     """A recording whose rows come one after the other from row `begin` on, `speed` times as fast as they were taken."""
 
-    def __init__(self, rows: FixedRows, begin: int, speed: float, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, rows: FixedRows, begin: int, speed: float, now_s: Callable[[], float]) -> None:
         self._rows, self._begin, self._speed, self._now_s = rows, begin, speed, now_s
         self._start_s = now_s()
         self.name, self.channels, self.period_s = rows.name, rows.channels, rows.period_s

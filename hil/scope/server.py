@@ -141,13 +141,9 @@ def bound(host: str, port: int) -> socket.socket:
     """Return a listening socket. port 0: any free one. Raises InputError if it is taken or no address of this PC."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        listening = socket.socket(family, socket.SOCK_STREAM)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind((host, port))
-        listening.listen(64)
+        return socket.create_server((host, port), family=family, backlog=64)
     except OSError as error:
         raise InputError(f"{host}:{port}: cannot be used ({error.strerror or error}); give another --port") from None
-    return listening
 
 
 def address(listening: socket.socket, token: str) -> str:

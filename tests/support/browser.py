@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from processes import DEADLINE_S
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
@@ -23,8 +23,8 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 class Page:
     """One page of the browser. `errors`: what it wrote to the console as an error, and exceptions."""
 
-    def __init__(self, address: str) -> None:
-        self._socket = connect(address, max_size=None, compression=None)
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
         self._number = 0
         self.errors: list[str] = []
         self.call("Runtime.enable")
@@ -86,10 +86,6 @@ class Page:
         if event.get("method") == "Log.entryAdded" and parameters["entry"]["level"] == "error":
             self.errors.append(str(parameters["entry"]))
 
-    def close(self) -> None:
-        """Close the connection to the page."""
-        self._socket.close()
-
 
 @contextmanager
 def browser(profile: Path, address: str) -> Iterator[Page]:
@@ -119,11 +115,8 @@ def browser(profile: Path, address: str) -> Iterator[Page]:
                 break
             assert time.monotonic() < end, "chromium opened no page"
             time.sleep(0.05)
-        page = Page(pages[0]["webSocketDebuggerUrl"])
-        try:
-            yield page
-        finally:
-            page.close()
+        with connect(pages[0]["webSocketDebuggerUrl"], max_size=None, compression=None) as socket:
+            yield Page(socket)
     finally:
         process.terminate()
         process.wait(DEADLINE_S)

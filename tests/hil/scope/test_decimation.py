@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -35,8 +37,8 @@ def test_each_stretch_keeps_its_extremes_in_their_order(values: np.ndarray, step
 def test_rows_that_come_in_whole_stretches_give_the_points_of_all_at_once(
     values: np.ndarray, step: int, pieces: list[int]
 ) -> None:
-    edges = np.minimum(np.cumsum([0, *pieces]) * step, values.shape[1]).tolist() + [values.shape[1]]
-    parts = [min_max(values[:, a:b], step) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    edges = [*np.minimum(np.cumsum([0, *pieces]) * step, values.shape[1]).tolist(), values.shape[1]]
+    parts = [min_max(values[:, a:b], step) for a, b in pairwise(edges)]
     assert np.array_equal(np.hstack(parts), min_max(values, step))
 
 

@@ -51,7 +51,7 @@ def run(
         compile_kernels()
         if with_scope:
             scope_beside()
-        with status_line(shown=err.is_terminal and not virtual):
+        with status_line(folder if err.is_terminal and not virtual else None):
             result = run_profile(
                 loaded, wanted, folder, profile.stem, virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
                 planned=lambda trajectory: err.print(

@@ -24,6 +24,9 @@ def scope(
     ),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any free one.")] = SCOPE_PORT,
     folder: Annotated[Path, typer.Option("--out", help="Folder for what is saved.")] = Path("runs"),
+    within: Annotated[
+        Path | None, typer.Option(help="Only runs that are recorded in this folder. Default: the newest one of all.")
+    ] = None,
     beside: Annotated[
         int | None, typer.Option(min=1, help="End when this process has ended and no page is open any more.")
     ] = None,
@@ -50,7 +53,7 @@ def scope(
     shown = [FixedRows.of_recording(read_run(path)) for path in given]
     own = is_loopback(host)
     token = "" if own else secrets.token_urlsafe(16)
-    live = None if shown else LiveRing().rows
+    live = None if shown else LiveRing(within).rows
 
     def make_session(page: str) -> PageSession:
         return PageSession(live, shown, {"page": page, "saves": own})

@@ -17,12 +17,12 @@ LOOK_S = 0.2  # how often a new run is looked for
 class LiveRing:
     """The rows of the newest run on this computer whose loop lives; those of the last one until there is another.
 
-    pid: only runs of this process. It takes no lock and changes nothing: `hil recover` and a new run find what they
-    would without it. The scope leaves the cores to which a loop is bound.
+    within: only runs that are recorded in this folder or below. It takes no lock and changes nothing: `hil recover` and
+    a new run find what they would without it. The scope leaves the cores to which a loop is bound.
     """
 
-    def __init__(self, pid: int | None = None) -> None:
-        self._pattern = PATTERN.replace("*", f"{pid}-*") if pid else PATTERN
+    def __init__(self, within: Path | None = None) -> None:
+        self._within = (within or Path("/")).resolve()
         self._rows: RingRows | None = None
         self._looked_s = float("-inf")
         self._cores = os.sched_getaffinity(0)
@@ -38,7 +38,7 @@ class LiveRing:
     def _look(self) -> None:
         """Take up the newest run that goes on, if there is one."""
         living = []
-        for path in FOLDER.glob(self._pattern):
+        for path in FOLDER.glob(PATTERN):
             with suppress(OSError, ValueError):  # just removed; another file
                 if Path(f"/proc/{owner_of(path)}").exists():
                     living.append((path.stat().st_ctime_ns, path))
@@ -49,7 +49,7 @@ class LiveRing:
                     rows = RingRows(Ring(descriptor), owner_of(path))
                 finally:
                     os.close(descriptor)  # the mapping stays
-                if not rows.ended:
+                if not rows.ended and rows.path.is_relative_to(self._within):
                     self._rows = rows
                     self._leave_cores(owner_of(path))
                     return

@@ -48,6 +48,7 @@ class PageSession:
         self._waiting: Waiting | None = None
         self._sent = -1  # rows before it are on the page; -1: the whole window is to be sent
         self._steps = 0
+        self._told = ""  # the mode that the page knows
         self._out: list[str | bytes] = []
 
     def step(self, texts: Sequence[str] = ()) -> list[str | bytes]:
@@ -64,7 +65,8 @@ class PageSession:
                 self._search(self._rows, self._waiting)
             elif self._still is None:
                 self._roll(self._rows)
-            if self._steps % STATUS_STEPS == 0:
+            if self._steps % STATUS_STEPS == 0 or self.mode != self._told:
+                self._told = self.mode
                 self._out.append(note("status", mode=self.mode, **status(self._rows, self._traces)))
         self._steps += 1
         return self._out
@@ -133,7 +135,8 @@ class PageSession:
         else:
             rows, first, end = self._still.rows, self._still.first, self._still.end
         if from_s is not None and to_s is not None and isinstance(rows, FixedRows):
-            first, end = rows.number_at(min(from_s, to_s)), rows.number_at(max(from_s, to_s)) + 1
+            first = rows.number_at(min(from_s, to_s))
+            end = max(first + 2, rows.number_at(max(from_s, to_s)) + 1)
         first, end = max(first, rows.first), min(end, rows.end)
         if first >= end:
             raise InputError("there are no rows in this stretch of time: choose another one")

@@ -119,7 +119,8 @@ class RingRows:
         self.channels = tuple(task["channels"])
         self.metadata: dict[str, Any] = task["metadata"]
         self.period_s = float(self.metadata["period_s"])
-        self.name = task["path"].rsplit("/", 1)[-1].removesuffix(".arrows")
+        self.path = Path(task["path"])  # of the stream
+        self.name = self.path.stem
         if len(self.channels) != ring.columns or "time_s" not in self.channels:
             raise ValueError("not the ring of a run")
         values = np.frombuffer(ring.memory, np.float64, ring.rows * ring.columns, ROWS_AT)

@@ -7,6 +7,7 @@ origin is refused (RFC 6455, section 10.2), and so is a host name that is not th
 from __future__ import annotations
 
 import asyncio
+import os
 import secrets
 import socket
 import time
@@ -143,7 +144,8 @@ def bound(host: str, port: int) -> socket.socket:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         return socket.create_server((host, port), family=family, backlog=64)
     except OSError as error:
-        raise InputError(f"{host}:{port}: cannot be used ({error.strerror or error}); give another --port") from None
+        why = error.strerror if isinstance(error, socket.gaierror) else os.strerror(error.errno or 0)
+        raise InputError(f"{host}:{port}: cannot be used ({why}); give another --port or --host") from None
 
 
 def address(listening: socket.socket, token: str) -> str:

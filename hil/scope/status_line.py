@@ -1,6 +1,6 @@
 """One line in the terminal for a run that goes on, by a process of its own that reads the ring; see `hil run`.
 
-python -m hil.scope.status_line PID      # PID: of the loop; standard input ends when the line shall vanish
+python -m hil.scope.status_line FOLDER      # of the recording; standard input ends when the line shall vanish
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import os
 import select
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -47,7 +49,7 @@ def line(told: Mapping[str, Any], traces: Mapping[str, Trace]) -> str:
 def main() -> None:
     """Show the line until standard input ends or the run does."""
     os.nice(10)
-    live, rows, traces = LiveRing(int(sys.argv[1])), None, dict[str, Trace]()
+    live, rows, traces = LiveRing(Path(sys.argv[1])), None, dict[str, Trace]()
     text = Text(no_wrap=True, overflow="ellipsis")
     with Live(text, console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True) as view:
         while not select.select([sys.stdin], [], [], EVERY_S)[0]:
@@ -63,4 +65,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with suppress(OSError):  # a terminal that is closed
+        main()

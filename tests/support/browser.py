@@ -18,6 +18,7 @@ from processes import DEADLINE_S
 from websockets.sync.client import ClientConnection, connect
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+NO_CHROMIUM = "no chromium to open the page with: apt-get install chromium"
 
 
 class Page:
@@ -82,16 +83,16 @@ class Page:
     def _note(self, event: dict[str, Any]) -> None:
         parameters = event.get("params", {})
         if event.get("method") == "Runtime.exceptionThrown":
-            self.errors.append(str(parameters["exceptionDetails"]))
+            self.errors.append(parameters["exceptionDetails"]["exception"]["description"][:300])
         if event.get("method") == "Log.entryAdded" and parameters["entry"]["level"] == "error":
-            self.errors.append(str(parameters["entry"]))
+            self.errors.append(parameters["entry"]["text"])
 
 
 @contextmanager
 def browser(profile: Path, address: str) -> Iterator[Page]:
     """Open a page in a browser of its own that reaches no other computer."""
     if CHROMIUM is None:
-        pytest.skip("no chromium to open the page with: apt-get install chromium")
+        pytest.skip(NO_CHROMIUM)
     process = subprocess.Popen(
         [
             CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0",

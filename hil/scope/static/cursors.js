@@ -46,6 +46,8 @@ export class Cursors {
     const { ctx, bbox } = plot, ratio = devicePixelRatio;
     ctx.save();
     ctx.strokeStyle = ctx.fillStyle = colour("cursor");
+    ctx.textAlign = "left";
+    ctx.textBaseline = "alphabetic";
     ctx.lineWidth = 1.5 * ratio;
     ctx.font = `${11 * ratio}px system-ui, sans-serif`;
     this.at.forEach((time, index) => {

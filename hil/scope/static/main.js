@@ -130,15 +130,15 @@ function ask() {
 setInterval(() => { if (scope.moved || scope.mode === "rolling") ask(); }, MEASURE_MS);
 
 function frame() {
+  requestAnimationFrame(frame); // first: an error in a picture must not be the last one
   if (scope.dirty) { scope.dirty = false; scope.panels.draw(); }
-  requestAnimationFrame(frame);
 }
 frame();
 
 const hold = () => { say(""); scope.send({ do: "hold", on: scope.mode === "rolling" }); scope.trigger.came(false); };
 function cursors() {
   if (scope.cursors.on) scope.cursors.hide();
-  else { if (scope.mode === "rolling") hold(); scope.cursors.show(scope.store.range); }
+  else { if (scope.mode === "rolling") hold(); scope.cursors.show(scope.store.extent); }
   element("cursors").classList.toggle("on", scope.cursors.on);
 }
 function toggle(name, section, plot) {
@@ -169,6 +169,7 @@ document.onkeydown = (event) => {
   if (action) { event.preventDefault(); action(); }
 };
 document.onclick = (event) => { if (!element("choose").contains(event.target)) element("choose").open = false; };
-new ResizeObserver(() => { scope.panels.resize(); }).observe(element("plots"));
+new ResizeObserver(() => scope.panels.resize()).observe(element("plots"));
+window.onresize = () => scope.panels.resize();
 matchMedia("(prefers-color-scheme: dark)").onchange = () => { scope.panels.restyle(); spectrum.clear(); xy.clear(); scope.redraw(); ask(); };
 window.scope = scope; // for the console and the tests

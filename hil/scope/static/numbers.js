@@ -16,12 +16,14 @@ export function steadyUnit(si, largest, before) {
   return unitFor(si, largest * 2.5).factor > before.factor ? next : before;
 }
 
+// The unit is chosen so that a small number is next to nothing: at most `significant` decimals.
 export function digits(value, significant = 4) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size >= 1e6 || size < 1e-4)) return value.toExponential(significant - 2);
-  const decimals = Math.max(0, significant - 1 - Math.floor(Math.log10(Math.max(size, 1e-3))));
-  return value.toFixed(Math.min(decimals, 5)).replace("-", "−");
+  if (size >= 1e6) return value.toExponential(significant - 1);
+  const decimals = significant - 1 - Math.floor(Math.log10(Math.max(size, 1)));
+  const text = value.toFixed(Math.max(0, decimals));
+  return Number(text) === 0 ? "0" : text.replace("-", "−");
 }
 
 export function quantity(value, si, significant = 4) {

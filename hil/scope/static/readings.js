@@ -14,16 +14,16 @@ export function showStatus(status, traces) {
   const error = find((trace) => trace.name === "following_error_m");
   const pull = find((trace) => ["torque", "force"].includes(trace.panel) && trace.role === "measured");
   const told = [position, error, pull].filter(Boolean).map((trace) => [
-    trace === error ? "following error" : trace.panel, quantity(newest[trace.name], trace.unit, 4)]);
+    trace === error ? "following error" : trace.panel, quantity(newest[trace.name], trace.unit, 4), "moving"]);
   const late = status.lateness_s;
-  if (late) told.push(["late p50 / p99 / max", `${["p50", "p99", "max"].map((key) => digits(late[key] * 1e6, 3)).join(" / ")} µs`]);
+  if (late) told.push(["late p50 / p99 / max", `${["p50", "p99", "max"].map((key) => Math.round(late[key] * 1e6)).join(" / ")} µs`]);
   if (status.skipped) told.push(["ticks left out", String(status.skipped)]);
   if (status.bus_load !== undefined && status.bus_load !== null) told.push(["bus", `${digits(100 * status.bus_load, 2)} %`]);
   if (status.progress !== null && status.progress !== undefined) told.push(["done", `${Math.round(100 * status.progress)} %`]);
-  element("readings").replaceChildren(...told.map(([name, value]) => {
+  element("readings").replaceChildren(...told.map(([name, value, className]) => {
     const pair = document.createElement("div");
     pair.append(Object.assign(document.createElement("dt"), { textContent: name }),
-      Object.assign(document.createElement("dd"), { textContent: value, className: "wide" }));
+      Object.assign(document.createElement("dd"), { textContent: value, className: className ?? "" }));
     return pair;
   }));
 }
@@ -35,28 +35,33 @@ export function showMeasured(measured, traces, cursors, reversed) {
   element("between").textContent = cursors
     ? `A ${quantity(cursors[0], "s", 5)}, B ${quantity(cursors[1], "s", 5)}: B − A ${quantity(cursors[1] - cursors[0], "s", 5)}, ${digits(1 / Math.abs(cursors[1] - cursors[0]), 4)} Hz`
     : `${quantity(length, "s", 4)}, ${measured.rows} rows`;
-  const heads = [...(cursors ? ["A", "B", "B − A"] : []), "mean", "std", "rms", "min", "max", "p-p"];
-  const rows = [];
-  let panel = "";
-  for (const trace of traces.filter((one) => one.name in measured.traces)) {
-    const values = measured.traces[trace.name];
-    const { factor, name } = unitFor(trace.unit, Math.max(Math.abs(values.min), Math.abs(values.max)));
-    if (trace.panel !== panel) {
-      panel = trace.panel;
-      const cell = Object.assign(document.createElement("td"), { textContent: panel, colSpan: heads.length + 2 });
-      const group = document.createElement("tr");
-      group.className = "group"; group.append(cell); rows.push(group);
+  const table = (heads, values) => {
+    const rows = [];
+    let panel = "";
+    for (const trace of traces.filter((one) => one.name in measured.traces)) {
+      const all = measured.traces[trace.name];
+      const { factor, name } = unitFor(trace.unit, Math.max(Math.abs(all.min), Math.abs(all.max)));
+      if (trace.panel !== panel) rows.push(row("group", [(panel = trace.panel)], heads.length + 2));
+      rows.push(row("", [trace.label, name, ...values(all).map((value) => digits(value * factor))]));
+      rows[rows.length - 1].dataset.trace = trace.name;
     }
-    const [a, b] = reversed ? [values.last, values.first] : [values.first, values.last];
-    const shown = [...(cursors ? [a, b, b - a] : []), values.mean, values.std, values.rms, values.min, values.max, values.span];
-    const row = document.createElement("tr");
-    row.dataset.trace = trace.name;
-    row.append(...[trace.label, name, ...shown.map((value) => digits(value * factor))].map((text) =>
-      Object.assign(document.createElement("td"), { textContent: text })));
-    rows.push(row);
-  }
-  const table = document.createElement("table"), head = document.createElement("thead"), body = document.createElement("tbody");
-  head.append(Object.assign(document.createElement("tr"), { innerHTML: ["", "", ...heads].map((text) => `<th>${text}</th>`).join("") }));
-  body.append(...rows); table.append(head, body);
-  element("measured").replaceChildren(table);
+    const made = make("table"), head = make("thead"), body = make("tbody");
+    const names = make("tr");
+    names.append(...["", "", ...heads].map((text) => make("th", text)));
+    head.append(names); body.append(...rows); made.append(head, body);
+    return made;
+  };
+  const ends = ({ first, last }) => (reversed ? [last, first, first - last] : [first, last, last - first]);
+  const tables = cursors ? [table(["A", "B", "B − A"], ends)] : [];
+  tables.push(table(["mean", "std", "rms", "min", "max", "p-p"], (all) => [all.mean, all.std, all.rms, all.min, all.max, all.span]));
+  element("measured").replaceChildren(...tables);
+}
+
+const make = (tag, textContent = "") => Object.assign(document.createElement(tag), { textContent });
+
+function row(className, texts, colSpan = 1) {
+  const made = make("tr");
+  made.className = className;
+  made.append(...texts.map((text) => Object.assign(make("td", text), { colSpan })));
+  return made;
 }

@@ -1,16 +1,18 @@
 // Points on the page: those of the rows that roll or rest, and those of the second recording.
 
+const LEAST_S = 1e-4; // of the time axis
+
 export class Store {
   constructor() { this.clear(); }
 
   clear() {
-    this.names = []; this.rows = [new Float64Array()]; this.zero = 0; this.still = false; this.window = 0;
+    this.names = []; this.rows = [new Float64Array()]; this.zero = 0; this.still = false; this.window = 1;
     this.second = null;
   }
 
   view(frame) {
     this.names = frame.traces; this.rows = frame.rows; this.zero = frame.zero_s; this.still = frame.still;
-    this.window = frame.window_s ?? 0;
+    this.window = frame.window_s ?? this.window;
     if (!frame.still) this.second = null;
   }
 
@@ -28,17 +30,22 @@ export class Store {
     });
   }
 
-  // Time axis as drawn: from the trigger on, if there is one.
-  get range() {
+  // Times of the first and the last point, from the trigger on if there is one.
+  get extent() {
     const times = this.rows[0];
-    if (!times.length) return [0, this.window || 1];
-    const last = times[times.length - 1] - this.zero;
-    if (this.still) return [times[0] - this.zero, Math.max(last, times[0] - this.zero + 1e-9)];
-    return [last - this.window, last];
+    if (!times.length) return [0, this.window];
+    const first = times[0] - this.zero;
+    return [first, Math.max(times[times.length - 1] - this.zero, first + LEAST_S)];
   }
 
-  // Data of uPlot for traces in the unit with this factor; those of the second recording follow.
-  data(names, factor) {
+  // Time axis as drawn.
+  get range() {
+    const [first, last] = this.extent;
+    return this.still ? [first, last] : [last - this.window, last];
+  }
+
+  // Data of uPlot for traces in the unit with this factor; with `second` those of the second recording follow.
+  data(names, factor, second) {
     const pick = (rows, all) => {
       const at = (name) => rows[1 + all.indexOf(name)];
       const scaled = (row) => (factor === 1 ? row : row.map((value) => value * factor));
@@ -46,7 +53,8 @@ export class Store {
       return [times, ...names.map((name) => (all.includes(name) ? scaled(at(name)) : new Array(times.length).fill(null)))];
     };
     const first = pick(this.rows, this.names);
-    return this.second ? uPlot.join([first, pick(this.second.rows, this.second.traces)]) : first;
+    if (!second) return first;
+    return uPlot.join([first, this.second ? pick(this.second.rows, this.second.traces) : [[], ...names.map(() => [])]]);
   }
 
   largest(names) {

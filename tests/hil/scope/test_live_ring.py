@@ -37,7 +37,7 @@ def opened(pid: int) -> RingRows:
 
 def test_rows_are_those_of_the_loop(tmp_path: Path) -> None:
     with recorder(tmp_path, 50) as run:
-        rows = LiveRing(os.getpid()).rows()
+        rows = LiveRing(tmp_path).rows()
         assert rows is not None
         assert (rows.name, rows.channels, rows.period_s) == ("run", CHANNELS, PERIOD_S)
         assert (rows.first, rows.end, rows.ended) == (0, 50, False)
@@ -101,7 +101,7 @@ def test_no_row_is_mixed_while_the_loop_writes_over_them(tmp_path: Path) -> None
 
 
 def test_the_ring_of_the_next_run_is_found(tmp_path: Path) -> None:
-    found = LiveRing(os.getpid())
+    found = LiveRing(tmp_path)
     assert found.rows() is None
     with recorder(tmp_path, 5):
         first = found.rows()
@@ -117,7 +117,7 @@ def test_the_ring_of_the_next_run_is_found(tmp_path: Path) -> None:
 
 def test_a_killed_loop_leaves_its_rows_and_does_not_hold_back_the_recovery(tmp_path: Path, kept_cores: object) -> None:
     loop = Loop(tmp_path)
-    found = LiveRing(loop.process.pid)
+    found = LiveRing(tmp_path)
     rows = found.rows()
     assert rows is not None
     assert rows.end == ROWS
@@ -127,6 +127,13 @@ def test_a_killed_loop_leaves_its_rows_and_does_not_hold_back_the_recovery(tmp_p
     assert "no gap" in recover(tmp_path)
     assert found.rows() is rows
     assert len(rows.read(0, ROWS)) == ROWS
+
+
+def test_only_runs_of_a_folder_are_found(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    with recorder(tmp_path / "one", 5):
+        assert LiveRing(tmp_path / "other").rows() is None
+        assert LiveRing(tmp_path).rows() is not None
 
 
 def test_files_that_are_no_ring_are_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,7 +151,7 @@ def test_the_scope_leaves_the_core_to_which_a_loop_is_bound(tmp_path: Path, kept
     loop = Loop(tmp_path)
     try:
         os.sched_setaffinity(loop.process.pid, {max(kept_cores)})
-        assert LiveRing(loop.process.pid).rows() is not None
+        assert LiveRing(tmp_path).rows() is not None
         assert os.sched_getaffinity(0) == kept_cores - {max(kept_cores)}
     finally:
         loop.kill(loop.keeper, loop.writer)

@@ -36,7 +36,7 @@ def run(folder: Path) -> Recording:
 @pytest.fixture(scope="module")
 def live(folder: Path) -> Iterator[str]:
     """A scope that waits for runs."""
-    with scope(folder) as address:
+    with scope(folder, "--within", ".") as address:
         yield address
 
 
@@ -132,9 +132,7 @@ def test_what_is_saved_is_a_recording_that_compare_reads(folder: Path, run: Reco
         ran = hil(folder, "compare", "saved/cut.parquet", "--out", "compared")
         assert ran.returncode == 0, ran.stderr
         assert (folder / "compared" / "compare.html").exists()
-        assert (
-            post(shown, {"page": identity, "name": "cut"})[1]["path"] == "saved/cut_2.parquet"
-        )  # nothing is overwritten
+        assert post(shown, {"page": identity, "name": "cut"})[1]["path"] == "saved/cut_2.parquet"
 
 
 @pytest.mark.parametrize(

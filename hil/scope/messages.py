@@ -91,7 +91,7 @@ class Measure(PageMessage):
     to_s: float | None = None
 
 
-class Spectrum(PageMessage):
+class AskSpectrum(PageMessage):
     """Amplitude spectrum of a trace, in the same stretch as `Measure`."""
 
     do: Literal["spectrum"]
@@ -110,7 +110,7 @@ class AgainstEachOther(PageMessage):
     to_s: float | None = None
 
 
-AnyMessage = See | Show | Hold | Arm | Disarm | Play | Measure | Spectrum | AgainstEachOther
+AnyMessage = See | Show | Hold | Arm | Disarm | Play | Measure | AskSpectrum | AgainstEachOther
 _ADAPTER: TypeAdapter[AnyMessage] = TypeAdapter(Annotated[AnyMessage, Field(discriminator="do")])
 
 

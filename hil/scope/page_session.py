@@ -13,9 +13,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.quantities import reading_units
+from hil.scope import answers
 from hil.scope import messages as page
-from hil.scope.analysis import amplitude_spectrum, statistics
 from hil.scope.capture import Still, Waiting
 from hil.scope.decimation import min_max, point_times, stretch
 from hil.scope.messages import frame, note
@@ -24,8 +23,6 @@ from hil.scope.status import status
 from hil.scope.traces import Trace, compute, traces_of
 
 STATUS_STEPS = 6  # status is told every sixth step: 5 Hz
-SPECTRUM_POINTS = 2000
-XY_POINTS = 4000
 
 
 class PageSession:
@@ -100,20 +97,7 @@ class PageSession:
         if self._waiting is not None:
             self._waiting = Waiting(self._waiting.message, rows.first)
         self._traces = traces_of(rows.channels, rows.metadata)
-        units = {trace.unit: reading_units(trace.unit) for trace in self._traces.values()}
-        self._out.append(
-            note(
-                "rows",
-                name=rows.name,
-                bench=str((rows.metadata.get("bench") or {}).get("name", "")),
-                period_s=rows.period_s,
-                live=self._live is not None,
-                recordings=[one.name for one in self._recordings],
-                traces=[trace.described for trace in self._traces.values()],
-                units=units,
-                **self._about,
-            )
-        )
+        self._out.append(answers.of_rows(rows, self._traces, self._recordings, self._about))
 
     def _show_all(self) -> None:
         recording = self._recordings[0]
@@ -161,15 +145,15 @@ class PageSession:
             case page.Play():
                 self._play(message)
             case page.Measure():
-                self._measure(message)
-            case page.Spectrum():
+                names = [name for name in self._seen.traces if name in self._traces]
+                _, values = self._values(message.from_s, message.to_s, names)
+                self._out.append(answers.measured(names, values))
+            case page.AskSpectrum():
                 rows, values = self._values(message.from_s, message.to_s, [message.trace])
-                result = np.stack(amplitude_spectrum(values[1], rows.period_s, SPECTRUM_POINTS))
-                self._out.append(frame("spectrum", result, traces=[message.trace]))
+                self._out.append(answers.spectrum(message.trace, values, rows.period_s))
             case page.AgainstEachOther():
-                _, values = self._values(message.from_s, message.to_s, [message.x, message.y])
-                result = values[1:, :: -(-values.shape[1] // XY_POINTS)]
-                self._out.append(frame("xy", result, traces=[message.x, message.y]))
+                names = [message.x, message.y]
+                self._out.append(answers.against(names, self._values(message.from_s, message.to_s, names)[1]))
 
     def _hold(self, on: bool) -> None:
         if on and self._still is None and self._rows is not None:
@@ -286,11 +270,3 @@ class PageSession:
         elif rows.ended and isinstance(rows, FixedRows):
             self._waiting = None
             self._out.append(note("refused", text="the trigger does not come in the rest of this recording"))
-
-    def _measure(self, message: page.Measure) -> None:
-        names = [name for name in self._seen.traces if name in self._traces]
-        _, values = self._values(message.from_s, message.to_s, names)
-        found = {name: statistics(line) for name, line in zip(names, values[1:], strict=True)}
-        self._out.append(
-            note("measured", from_s=float(values[0, 0]), to_s=float(values[0, -1]), rows=values.shape[1], traces=found)
-        )

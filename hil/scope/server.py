@@ -118,13 +118,15 @@ class ScopeServer:
         session = self.pages[identity] = self.make_session(identity)
         waiting: asyncio.Queue[str] = asyncio.Queue(MOST_WAITING)
         reader = asyncio.create_task(_receive(socket, waiting))
+        due_s = time.monotonic()
         try:
             while not reader.done():
                 texts = [waiting.get_nowait() for _ in range(waiting.qsize())]
                 # in a thread: a long recording must not hold back the other pages
                 for message in await asyncio.to_thread(session.step, texts):
                     await (socket.send_text(message) if isinstance(message, str) else socket.send_bytes(message))
-                await asyncio.sleep(1.0 / RATE_HZ)
+                due_s = max(due_s + 1.0 / RATE_HZ, time.monotonic())
+                await asyncio.sleep(due_s - time.monotonic())
         except (WebSocketDisconnect, RuntimeError):  # closed while something was sent
             pass
         finally:

@@ -29,7 +29,8 @@ from hil.recording.recording import read_recording  # noqa: E402
 
 TRACES = [
     "position_command_m", "table_position_m", "motor_position_rad", "twin_table_position_m", "following_error_m",
-    "residual_table_m", "torque_command_n_m", "torque_n_m", "twin_torque_n_m", "residual_torque", "lateness_s", "cycle_s",
+    "residual_table_m", "torque_command_n_m", "torque_n_m", "twin_torque_n_m", "residual_torque", "lateness_s",
+    "cycle_s",
 ]  # fmt: skip
 SETTLE_S = 2.0  # left out at both ends of a phase
 
@@ -70,6 +71,13 @@ def phase(address: str, pages: int, duration_s: float) -> list[int]:
     return counts
 
 
+def now_of_the_run(address: str) -> float:
+    """Time of the newest row [s]; waits for the run."""
+    with page_of(address) as page:
+        page.send("see", traces=["lateness_s"], window_s=1.0, points=10)
+        return float(page.next("append")[1][0, -1])
+
+
 def main() -> None:
     """Run, watch, print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -98,24 +106,20 @@ def main() -> None:
         stack.callback(run.wait)
         stack.callback(run.kill)
         os.nice(10)  # the pages stand for a browser on this computer
-        with page_of(address) as page:
-            page.send("see", traces=TRACES, window_s=1.0, points=100)
-            page.next("append")
-            spans, memory = [], []
-            for number in range(given.phases):
-                pages = given.pages if number % 2 else 0
-                page.send("see", traces=["lateness_s"], window_s=1.0, points=10)
-                begin_s = float(page.next("view")[1][0, -1])
-                before_s = processor_s(scope.pid)
-                if pages:
-                    timer = threading.Timer(SETTLE_S, lambda: memory.append(memory_mb(scope.pid)))
-                    timer.start()
-                frames, size = phase(address, pages, given.phase_s)
-                share = (processor_s(scope.pid) - before_s) / given.phase_s
-                memory.append(memory_mb(scope.pid))
-                spans.append((pages, begin_s + SETTLE_S, begin_s + given.phase_s - SETTLE_S))
-                print(f"{pages} pages: server {100 * share:.1f} % of a core, {memory[-1]:.1f} MB, {frames} frames, "
-                      f"{size / 1e6:.2f} MB", flush=True)  # fmt: skip
+        spans, memory = [], []
+        for number in range(given.phases):
+            pages = given.pages if number % 2 else 0
+            begin_s = now_of_the_run(address)
+            before_s = processor_s(scope.pid)
+            if pages:
+                timer = threading.Timer(SETTLE_S, lambda: memory.append(memory_mb(scope.pid)))
+                timer.start()
+            frames, size = phase(address, pages, given.phase_s)
+            share = (processor_s(scope.pid) - before_s) / given.phase_s
+            memory.append(memory_mb(scope.pid))
+            spans.append((pages, begin_s + SETTLE_S, begin_s + given.phase_s - SETTLE_S))
+            print(f"{pages} pages: server {100 * share:.1f} % of a core, {memory[-1]:.1f} MB, {frames} frames, "
+                  f"{size / 1e6:.2f} MB", flush=True)  # fmt: skip
         run.terminate()
         run.wait()
         recording = read_recording(folder / "out" / "laps.parquet")

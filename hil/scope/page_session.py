@@ -94,9 +94,10 @@ class PageSession:
 
     def _begin(self, rows: ScopeRows) -> None:
         self._rows, self._still, self._sent = rows, None, -1
-        if self._waiting is not None:
-            self._waiting = Waiting(self._waiting.message, rows.first)
         self._traces = traces_of(rows.channels, rows.metadata)
+        if self._waiting is not None:  # in the new run, too, if it has the trace
+            message = self._waiting.message
+            self._waiting = Waiting(message, rows.first) if message.event or message.trace in self._traces else None
         self._out.append(answers.of_rows(rows, self._traces, self._recordings, self._about))
 
     def _show_all(self) -> None:

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from compare_runs import bench_with, record
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from hil.recording.recording import Recording
 from hil.scope.decimation import min_max, stretch
-from hil.scope.messages import read_frame
+from hil.scope.messages import frame, read_frame
 from hil.scope.page_session import PageSession
 from hil.scope.rows import FixedRows, ReplayedRows
 
@@ -142,6 +145,34 @@ def test_what_rolls_is_the_same_as_what_is_sent_whole(recording: Recording) -> N
     joined = np.hstack(pieces)
     whole = [values for header, values in see(rolling, points=100) if header["kind"] == "view"][-1]
     assert np.array_equal(joined[:, -whole.shape[1] :], whole)
+
+
+def test_a_trigger_waits_on_in_the_next_run_if_that_has_its_trace(recording: Recording) -> None:
+    now, present = [0.0], list[ReplayedRows]()
+    session = PageSession(live=lambda: present[-1] if present else None)  # type: ignore[arg-type, return-value]
+    columns = {name: recording[name] for name in ("time_s", "motor_position_rad", "table_position_m")}
+    present.append(ReplayedRows(FixedRows.of_recording(recording), 0, 1.0, lambda: now[0]))
+    took(session)
+    took(session, do="arm", trace="table_position_m", level=0.02, pre_s=0.0, post_s=0.01)
+    present.append(ReplayedRows(FixedRows("next", columns, recording.period_s), 0, 1.0, lambda: now[0]))
+    assert only(took(session), "rows")[0]["name"] == "next"
+    assert session.mode == "waiting"
+    now[0] = 10.0
+    assert only(took(session), "triggered")
+    took(session, do="arm", trace="table_position_m", level=0.02, pre_s=0.0, post_s=0.01)
+    del columns["table_position_m"]
+    present.append(ReplayedRows(FixedRows("other", columns, recording.period_s), 0, 1.0, lambda: now[0]))
+    took(session)
+    assert session.mode == "rolling"
+
+
+@given(arrays(np.float64, st.tuples(st.integers(0, 5), st.integers(0, 9))), st.text(max_size=20))
+def test_a_frame_is_read_as_it_was_made(values: np.ndarray, text: str) -> None:
+    data = frame("view", values, traces=[text])
+    header, read = read_frame(data)
+    assert (header["kind"], header["traces"]) == ("view", [text])
+    assert np.array_equal(read, values, equal_nan=True)
+    assert (len(data) - values.nbytes) % 8 == 0  # aligned, as Float64Array asks for
 
 
 @pytest.mark.parametrize(

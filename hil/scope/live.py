@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+import threading
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -26,14 +27,16 @@ class LiveRing:
         self._rows: RingRows | None = None
         self._looked_s = float("-inf")
         self._cores = os.sched_getaffinity(0)
+        self._lock = threading.Lock()
 
     def rows(self) -> RingRows | None:
         """Return the rows of the run; None before the first one."""
-        if time.monotonic() - self._looked_s >= LOOK_S:
-            self._looked_s = time.monotonic()
-            if self._rows is None or self._rows.ended:
-                self._look()
-        return self._rows
+        with self._lock:  # every page asks, from threads of its own
+            if time.monotonic() - self._looked_s >= LOOK_S:
+                self._looked_s = time.monotonic()
+                if self._rows is None or self._rows.ended:
+                    self._look()
+            return self._rows
 
     def _look(self) -> None:
         """Take up the newest run that goes on, if there is one."""
@@ -55,9 +58,9 @@ class LiveRing:
                     return
 
     def _leave_cores(self, pid: int) -> None:
-        with suppress(OSError):
-            left = self._cores - os.sched_getaffinity(pid)
-            os.sched_setaffinity(0, left or self._cores)
+        for thread in Path("/proc/self/task").iterdir():  # an affinity is that of one thread
+            with suppress(OSError):
+                os.sched_setaffinity(int(thread.name), self._cores - os.sched_getaffinity(pid) or self._cores)
 
 
 def owner_of(path: Path) -> int:

@@ -81,8 +81,9 @@ def now_of_the_run(address: str) -> float:
 def main() -> None:
     """Run, watch, print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--phases", type=int, default=8)
-    parser.add_argument("--phase-s", type=float, default=30.0)
+    parser.add_argument("--phases", type=int, default=24)
+    parser.add_argument("--phase-s", type=float, default=10.0)
+    parser.add_argument("--beside-the-loop", action="store_true", help="let the pages run on the loop's core, too")
     parser.add_argument("--pages", type=int, default=3)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place, ExitStack() as stack:
@@ -105,11 +106,13 @@ def main() -> None:
         run = subprocess.Popen([*python, *command], cwd=folder)
         stack.callback(run.wait)
         stack.callback(run.kill)
-        os.nice(10)  # the pages stand for a browser on this computer
-        spans, memory = [], []
+        os.nice(10)
+        spans, memory, cores = [], [], os.sched_getaffinity(0)
         for number in range(given.phases):
             pages = given.pages if number % 2 else 0
             begin_s = now_of_the_run(address)
+            if not given.beside_the_loop:  # as pages on another computer, or a core that only the loop uses
+                os.sched_setaffinity(0, cores - os.sched_getaffinity(run.pid) or cores)
             before_s = processor_s(scope.pid)
             if pages:
                 timer = threading.Timer(SETTLE_S, lambda: memory.append(memory_mb(scope.pid)))

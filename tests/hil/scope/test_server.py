@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import socket
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -190,6 +192,13 @@ def test_arguments_that_are_wrong(folder: Path, run: Recording) -> None:
         taken.listen()
         assert "another --port" in refused(folder, "scope", "--port", str(taken.getsockname()[1]))
     assert "cannot be used" in refused(folder, "scope", "--host", "192.0.2.1", "--port", "0")
+
+
+def test_without_the_extra_the_message_says_what_to_install(folder: Path) -> None:
+    code = "import sys; sys.modules['uvicorn'] = None; sys.argv = ['hil', 'scope']; from hil.cli import main; main()"
+    ran = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+    assert ran.returncode == 2
+    assert ran.stderr.strip() == "hil scope needs uvicorn: pip install 'hil-servo[scope]'"
 
 
 def test_a_page_that_sends_nonsense_is_told_so_and_stays(shown: str) -> None:

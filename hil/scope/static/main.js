@@ -83,7 +83,7 @@ const on = {
       scope.known.add(trace.name);
       if (SHOWN.includes(trace.panel)) scope.chosen.add(trace.name);
     }
-    element("name").textContent = [run.recordings.length ? run.recordings.join(" and ") : run.name, run.bench && `bench ${run.bench}`,
+    element("name").textContent = [run.recordings.length > 1 ? `${run.recordings[0]}, dashed: ${run.recordings[1]}` : run.name, run.bench && `bench ${run.bench}`,
       `${+(1e3 * run.period_s).toPrecision(4)} ms`].filter(Boolean).join(" · ");
     element("replay").hidden = run.live; element("shiftLabel").hidden = run.recordings.length < 2;
     element("saving").hidden = !run.saves;

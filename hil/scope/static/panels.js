@@ -4,7 +4,7 @@ import { digits, stateName, steadyUnit, unitFor } from "./numbers.js";
 
 const LEAST = 104, MOST = 260, SMALL = 96, HEAD = 24, TIMES = 42, AXIS = 62; // CSS pixels
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-const LEAST_MARGIN = 1e-6; // in the unit shown; uPlot finds no ticks in ranges as small as rounding errors
+const LEAST_MARGIN = 1e-3; // in the unit shown; uPlot finds no ticks in ranges as small as rounding errors
 
 // What is measured lies broad under the others, so that all of them are seen where they are equal.
 const WIDTH = { measured: 3.4, "measured 2": 3.4, twin: 1.6, "twin 2": 1.6, commanded: 1 };

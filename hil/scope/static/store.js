@@ -57,11 +57,13 @@ export class Store {
     return uPlot.join([first, this.second ? pick(this.second.rows, this.second.traces) : [[], ...names.map(() => [])]]);
   }
 
+  // Greatest magnitude of traces [SI], in both recordings.
   largest(names) {
     let most = 0;
-    for (const name of names) {
-      const at = this.names.indexOf(name);
-      if (at >= 0) for (const value of this.rows[1 + at]) most = Math.max(most, Math.abs(value));
+    for (const { traces, rows } of [{ traces: this.names, rows: this.rows }, ...(this.second ? [this.second] : [])]) {
+      for (const name of names.filter((one) => traces.includes(one))) {
+        for (const value of rows[1 + traces.indexOf(name)]) most = Math.max(most, Math.abs(value));
+      }
     }
     return most;
   }

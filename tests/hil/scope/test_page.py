@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from browser import CHROMIUM, NO_CHROMIUM, Page, browser
@@ -127,8 +128,8 @@ def test_a_stretch_that_is_dragged_is_shown_with_every_row(page: Page) -> None:
     before = page.run(span)
     page.drag(centre(page, "torque", 0.7), centre(page, "torque", 0.8))
     page.until(f"{span} < {0.2 * before}")
-    rows = page.run("scope.store.rows[0].length")
-    assert rows == pytest.approx(1000 * page.run(span), abs=3)
+    steps_s = np.diff(page.run("[...scope.store.rows[0]]"))
+    assert np.median(steps_s) == pytest.approx(0.001)  # a busy machine leaves out some
     rolls(page)
 
 
@@ -164,11 +165,10 @@ def test_a_single_shot_stands_at_its_level(page: Page) -> None:
     page.click("#single")
     page.until("scope.mode === 'waiting'")
     page.until("scope.store.still && scope.store.zero > 0 && scope.mode === 'held'")
-    low, high = page.run("scope.store.range")
-    assert low == pytest.approx(-0.1, abs=0.002)
-    assert high == pytest.approx(0.4, abs=0.002)
-    row = "scope.store.rows[1 + scope.store.names.indexOf('table_position_m')]"
+    assert page.run("scope.store.rows[0].length") == 501
     at = page.run("scope.store.rows[0].findIndex(time => time >= scope.store.zero)")
+    assert at == 100
+    row = "scope.store.rows[1 + scope.store.names.indexOf('table_position_m')]"
     before, after = page.run(f"[{row}[{at} - 1], {row}[{at}]]")
     assert before < 0.020 <= after
     assert page.run("scope.panels.all[0].plot.axes[0].label") in (None, "time from the trigger [s]")
@@ -178,8 +178,9 @@ def test_what_is_seen_is_saved(page: Page, folder: Path) -> None:
     page.run("document.getElementById('saveName').value = 'seen'")
     page.click("#save")
     page.until("document.getElementById('message').textContent.includes('hil compare saved/seen.parquet')")
+    assert "saved 501 rows" in page.run("document.getElementById('message').textContent")
     saved = read_recording(folder / "saved" / "seen.parquet")
-    assert abs(len(saved) - 501) <= 2
+    assert saved["time_s"][[0, -1]] == pytest.approx(page.run("[scope.store.rows[0][0], scope.store.rows[0].at(-1)]"))
     assert saved.metadata["bench"]["name"] == "reference"
     rolls(page)
 
@@ -203,6 +204,7 @@ def test_the_page_fits_narrow_and_wide_light_and_dark(page: Page, width: int, da
 
 
 def test_the_page_goes_on_after_the_bench_is_started_anew(page: Page, bench: BenchRuns) -> None:
+    rolls(page)
     assert page.run("scope.run.name") == "first"
     bench.kill()
     bench.start("second")

@@ -32,6 +32,7 @@ from hil.commands.paper import paper
 from hil.commands.prove import prove
 from hil.commands.recover import recover
 from hil.commands.run import run
+from hil.commands.scope import scope
 from hil.commands.validate import validate
 from hil.commands.warm_up import warm_up
 from hil.compiled.kernel_cache import provide_kernel_cache
@@ -64,6 +65,7 @@ def _options(
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("demo", demo),
     ("run", run),
+    ("scope", scope),
     ("recover", recover),
     ("explain", explain),
     ("import", import_),

@@ -99,9 +99,14 @@ def unit_of(name: str) -> str:
     return next((unit for ending, unit in _ENDINGS.items() if padded.endswith(f"_{ending}")), "1")
 
 
+def reading_units(unit: str) -> tuple[tuple[float, float, str], ...]:
+    """Units in which values of the SI unit `unit` are shown: (from this magnitude on, factor, unit), largest first."""
+    return _READ_IN.get(unit, ((0.0, 1.0, unit),))
+
+
 def reading_unit(unit: str, largest: float) -> ReadingUnit:
     """Unit in which values of the SI unit `unit` up to the magnitude `largest` are shown."""
-    choices = _READ_IN.get(unit, ((0.0, 1.0, unit),))
+    choices = reading_units(unit)
     return next(ReadingUnit(factor, shown) for start, factor, shown in choices if abs(largest) >= start or start == 0.0)
 
 

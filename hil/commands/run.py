@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -23,6 +24,9 @@ def run(
     force: Force = False,
     reset_fault: ResetFault = False,
     seed: Seed = None,
+    with_scope: Annotated[
+        bool, typer.Option("--scope", help="Show the run in a browser; the scope ends when no page is open any more.")
+    ] = False,
     folder: Out = None,
     bus_log: Annotated[
         Path | None,
@@ -36,8 +40,9 @@ def run(
 
     Exit code 3: the drive did not confirm that its power stage is off; switch it off at the mains.
     """
+    from hil.commands.beside import scope_beside, status_line
     from hil.commands.warm_up import compile_kernels
-    from hil.errors import HilError
+    from hil.errors import HilError, InputError
     from hil.files.output import default_folder
     from hil.loop.bus_log import log_bus
     from hil.loop.run import run_profile
@@ -45,16 +50,22 @@ def run(
     from hil.loop.supervision import Ending
     from hil.motion.profile import load_profile
 
+    if with_scope and virtual:
+        raise InputError("given --scope with --virtual, allowed with --wall: look at the recording with hil scope FILE")
     folder = folder or default_folder(profile.stem)
     loaded = load_simulated(bench)
     with named(bench, profile):
         wanted = load_profile(profile)
         compile_kernels()
         with log_bus(loaded, bus_log) if bus_log else nullcontext():
-            result = run_profile(
-                loaded, wanted, folder, profile.stem, virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
-                planned=lambda trajectory: err.print(
-                    f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
+            if with_scope:
+                scope_beside()
+            with status_line(folder if err.is_terminal and not virtual else None):
+                result = run_profile(
+                    loaded, wanted, folder, profile.stem,
+                    virtual=virtual, force=force, reset_fault=reset_fault, seed=seed,
+                    planned=lambda trajectory: err.print(
+                        f"{profile.stem} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."))  # fmt: skip
             say(result, virtual)  # also where the log fails
     if bus_log:
         out.print(f"Log of the bus: {bus_log}")
@@ -85,3 +96,5 @@ def say(result: RunResult, virtual: bool) -> None:
     if not virtual:
         out.print(f"lateness of the ticks: {result.jitter.text}, {result.outcome.skipped} left out")
     out.print(f"{result.outcome.rows} rows: {result.recording}")
+    if result.recording is not None:
+        out.print(f"next: hil {'compare' if result.complete else 'scope'} {shlex.quote(str(result.recording))}")

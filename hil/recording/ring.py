@@ -48,7 +48,8 @@ class Counter(IntEnum):
 
 
 class Ring:
-    """The shared memory of one recording, by its open file. `create` makes one, the constructor maps one."""
+    """The shared memory of one recording, by its open file. `create` makes one, the constructor maps one: only to read
+    where the file is open for reading only."""
 
     def __init__(self, descriptor: int) -> None:
         self.descriptor = descriptor
@@ -56,8 +57,10 @@ class Ring:
             counters = struct.unpack(f"={_COUNTER_BYTES // 8}q", os.pread(raw.fileno(), _COUNTER_BYTES, 0))
         self.rows, self.columns = counters[Counter.RING_ROWS], counters[Counter.COLUMNS]
         self._task_at = ROWS_AT + self.rows * self.columns * 8
+        writes = fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDWR
+        protection = mmap.PROT_READ | (mmap.PROT_WRITE if writes else 0)
         # populated, so that the loop meets no page fault on its first way round
-        self.memory = mmap.mmap(descriptor, self._task_at, mmap.MAP_SHARED | mmap.MAP_POPULATE)
+        self.memory = mmap.mmap(descriptor, self._task_at, mmap.MAP_SHARED | mmap.MAP_POPULATE, protection)
         self.counters = memoryview(self.memory)[:_COUNTER_BYTES].cast("q")
 
     @classmethod

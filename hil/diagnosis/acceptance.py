@@ -156,7 +156,7 @@ def _torque(of: Addition | Ablation, c: Criteria) -> Answer | None:
 def _explains(of: Remainder, c: Criteria) -> Answer:
     """Little is left, or noise; where inputs are open, or every channel is at its floor, most is explained."""
     stands = (
-        of.noise
+        (of.noise and of.above <= c.coloured)
         or names_stand(of.left, of.above, c)
         or (of.open_inputs and of.left <= c.most_left)
         or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))

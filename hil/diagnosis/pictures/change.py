@@ -11,7 +11,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import label_of_channel, unit_of_channel
 from hil.diagnosis.search.disturbance import disturbance
 from hil.errors import InputError
-from hil.figures.drawing import legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, SIMULATED, thin
 from hil.identification.estimator import Fit
 from hil.identification.residual_scales import inertia
@@ -32,7 +32,7 @@ def change_figure(diagnosis: Diagnosis) -> Figure:
     change = diagnosis.reported.judged.change
     if change is None:
         raise InputError("change: the axis did not change between or during these recordings")
-    figure = Figure(figsize=(10.0, 1.0 + 2.4 * len(change.runs)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 1.0 + 2.4 * len(change.runs)), layout="constrained")
     axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
     nominal = diagnosis.nominal
     for axis, run in zip(axes, change.runs, strict=True):

@@ -42,16 +42,25 @@ class View:
 
     term: Term
     run: Measured
-    measured: dict[str, FloatArray]  # residuals (n,) of the twin without the term, by channel
-    modelled: dict[str, FloatArray]  # part of them (n,) that the term models
-    torque: Disturbance  # the motor's residual as a torque on the motor
-    torque_modelled: Disturbance
+    before: dict[str, FloatArray]  # residuals (n,) of the twin without the term, by channel
+    after: dict[str, FloatArray]  # those (n,) of the final twin
+    torque: Disturbance  # the motor's residual before as a torque on the motor
+    torque_after: Disturbance
 
-    def residual(self, channel: str, modelled: bool) -> FloatArray:
-        """Residual (n,) or its modelled part; that of the motor as the torque that causes it."""
+    def residuals(self, channel: str) -> tuple[FloatArray, FloatArray]:
+        """Residuals (n,) before and after; those of the motor as the torque that causes them."""
         if channel == "motor":
-            return (self.torque_modelled if modelled else self.torque).torque
-        return (self.modelled if modelled else self.measured)[channel]
+            return self.torque.torque, self.torque_after.torque
+        return self.before[channel], self.after[channel]
+
+    @property
+    def strongest(self) -> str:
+        """Channel in which the term is largest against the noise."""
+        size = {
+            name: float(np.sqrt(np.mean((values - self.after[name])[self.run.evaluated] ** 2))) / noise(self.run, name)
+            for name, values in self.before.items()
+        }
+        return max(size, key=lambda name: size[name])
 
 
 Drawer = Callable[["Diagnosis", Sequence[View]], Captioned]
@@ -68,13 +77,12 @@ class Curve(NamedTuple):
 def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
     """Simulate a run without a term of the final hypothesis."""
     final, observer_s = diagnosis.final, diagnosis.train.observer_s
-    measured = without_terms(final.hypothesis, term).blocks(run, observer_s)
-    left = diagnosis.residuals(final, run)
-    modelled = {name: measured[name] - left[name] for name in measured}
-    torque, torque_modelled = (
-        disturbance(run, values["motor"], inertia(final.bench), observer_s) for values in (measured, modelled)
+    before = without_terms(final.hypothesis, term).blocks(run, observer_s)
+    after = diagnosis.residuals(final, run)
+    torque, torque_after = (
+        disturbance(run, values["motor"], inertia(final.bench), observer_s) for values in (before, after)
     )
-    return View(term, run, measured, modelled, torque, torque_modelled)
+    return View(term, run, before, after, torque, torque_after)
 
 
 def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: FloatArray) -> list[Curve]:

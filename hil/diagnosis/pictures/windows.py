@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.search.disturbance import disturbance
-from hil.figures.drawing import style_axis
+from hil.figures.drawing import WIDTH_IN, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
 from hil.identification.residual_scales import inertia
 
@@ -26,13 +26,14 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     shown = sorted(views, key=lambda view: not view.term.windows_of(view.run.name))[:MOST_RUNS]
     shown.sort(key=lambda view: view.run.start.time_s)
     ratio = diagnosis.given_bench.axis.ratio_m_rad
-    figure = Figure(figsize=(10.0, 2.6 + 2.2 * len(shown)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 1.8 + 2.0 * len(shown)), layout="constrained")
     axes = np.atleast_1d(figure.subplots(len(shown), 1))
     for axis, view in zip(axes, shown, strict=True):
         run, observer_s = view.run, diagnosis.train.observer_s
         given = diagnosis.residuals(diagnosis.searched.given, run)["motor"]
         of_bench_file = disturbance(run, given, inertia(diagnosis.given_bench), observer_s).torque / ratio
-        curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_bench_file
+        modelled = view.torque.torque - view.torque_after.torque
+        curves = modelled / ratio, view.torque.torque / ratio, of_bench_file
         rows = slice(run.evaluated.start, None)
         chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)
         looks = (

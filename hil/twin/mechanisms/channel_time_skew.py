@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Picture, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import Scene
 
@@ -98,6 +98,7 @@ MECHANISM = Mechanism(
     ),
     text=Text(
         "The channel {variant} is recorded {delay_s} late against the others.",
+        Picture.DELAY,
         reversed="The channel {variant} is recorded {delay_s} early against the others.",
     ),
     # motor position and torque are the clock unless their relation says otherwise: the first variant is named

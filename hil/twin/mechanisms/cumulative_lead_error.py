@@ -22,7 +22,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TRANSMISSION, _longer_lead),),
     text=Text(
         "The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
-        Picture.POSITION_TABLE,
+        Picture.LEAD_OVER_TRAVEL,
         reversed="The lead is wrong: the table goes {slope_m_m} too little for each metre of travel.",
     ),
     search=SearchHints(lambda s: [(1e-6 / s.travel_m,)], lambda a: (20e-6,), needs_table=True),

@@ -36,6 +36,6 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _lagging_current, "measured"),
         Variant(Stage.TORQUE, _lagging_current, "hidden"),
     ),
-    text=Text("The motor current follows its command with a time constant of {time_constant_s}.", Picture.DRIVE_LAW),
+    text=Text("The motor current follows its command with a time constant of {time_constant_s}.", Picture.DELAY),
     search=SearchHints(lambda s: [(2e-4,), (1e-3,)], lambda a: (5e-4,), proportional=False),
 )

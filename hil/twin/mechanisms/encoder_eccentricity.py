@@ -28,7 +28,7 @@ MECHANISM = Mechanism(
     ),
     variants=(Variant(Stage.MOTOR_READING, _eccentric_reading),),
     text=Text(
-        "The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.", Picture.MOTOR_ANGLE_TABLE
+        "The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.", Picture.MOTOR_READING
     ),
     search=SearchHints(typical=lambda a: (2e-4 / a.angle_per_unit, 0.0)),
 )

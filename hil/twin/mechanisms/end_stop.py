@@ -70,7 +70,7 @@ MECHANISM = Mechanism(
     ),
     text=Text(
         "From {edge_m} to the upper end of the travel, an elastic stop of {stiffness_n_m} pushes the table back.",
-        Picture.POSITION,
+        Picture.FORCE_OVER_TRAVEL,
     ),
     search=SearchHints(typical=lambda a: (100.0 * a.friction / a.ratio, 0.1)),
     valid=_is_at_an_end,

@@ -24,6 +24,6 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.COULOMB, _rising_level),),
     text=Text(
         "Friction changes along the travel by {slope_1_m}, as a share of its level at position zero.",
-        Picture.FRICTION_ALONG_TRAVEL,
+        Picture.FRICTION_OVER_TRAVEL,
     ),
 )

@@ -59,7 +59,7 @@ MECHANISM = Mechanism(
     text=Text(
         "From {begin_m} to {end_m} of the travel, friction is higher by a share of {fraction}; it changes over "
         "{flank_m} at either end.",
-        Picture.FRICTION_ALONG_TRAVEL,
+        Picture.FRICTION_OVER_TRAVEL,
         reversed="From {begin_m} to {end_m} of the travel, friction is lower by a share of {fraction}; it changes over "
         "{flank_m} at either end.",
     ),

@@ -39,7 +39,7 @@ MECHANISM = Mechanism(
     text=Text(
         "The lead errs with the angle of the screw: by {amplitude_m} once, {amplitude_2_m} twice and "
         "{amplitude_3_m} three times per revolution.",
-        Picture.SCREW_ANGLE,
+        Picture.LEAD_OVER_TURN,
     ),
     search=SearchHints(lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)], lambda a: (2e-6, 0.0)),
 )

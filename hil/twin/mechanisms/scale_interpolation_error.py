@@ -54,7 +54,7 @@ MECHANISM = Mechanism(
     ),
     variants=(Variant(Stage.TABLE_READING, _interpolated_reading),),
     text=Text(
-        "The linear encoder errs by {amplitude_m} within each signal period of {period_m}.", Picture.SIGNAL_PERIOD
+        "The linear encoder errs by {amplitude_m} within each signal period of {period_m}.", Picture.SCALE_READING
     ),
     search=SearchHints(_starts, lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0), needs_table=True),
     valid=_valid,

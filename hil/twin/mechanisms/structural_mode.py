@@ -148,7 +148,7 @@ MECHANISM = Mechanism(
     ),
     text=Text(
         "A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
-        Picture.SPECTRUM,
+        Picture.RESPONSE,
     ),
     search=SearchHints(
         lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)],

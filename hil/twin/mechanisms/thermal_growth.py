@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.scene import AxisFacts
 
@@ -36,7 +36,10 @@ MECHANISM = Mechanism(
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(Variant(Stage.TRANSMISSION, _grown_lead),),
-    text=Text("The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}."),
+    text=Text(
+        "The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}.",
+        Picture.GROWTH,
+    ),
     search=SearchHints(
         lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
         lambda a: (50e-6, 1800.0),

@@ -40,7 +40,7 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _gate, "measured gate"),
         Variant(Stage.TORQUE, _gate, "hidden gate"),
     ),
-    text=Text("The drive gives no torque for commands below {half_width_n_m}.", Picture.DRIVE_LAW),
+    text=Text("The drive gives no torque for commands below {half_width_n_m}.", Picture.CHARACTERISTIC),
     search=SearchHints(
         lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)], lambda a: (0.05 * a.friction,), proportional=False
     ),

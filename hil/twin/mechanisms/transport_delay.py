@@ -42,7 +42,7 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _delayed_command, "measured"),
         Variant(Stage.TORQUE, _delayed_command, "hidden"),
     ),
-    text=Text("The torque command acts {delay_s} later than the controller believes.", Picture.DRIVE_LAW),
+    text=Text("The torque command acts {delay_s} later than the controller believes.", Picture.DELAY),
     search=SearchHints(
         lambda s: [(delay_s,) for delay_s in (1.5e-4, 7e-4, *s.delays_s(0.0, _MOST_S))],
         lambda a: (5e-4,),

@@ -11,7 +11,8 @@ from matplotlib.container import ErrorbarContainer
 from hil.arrays import FloatArray
 from hil.diagnosis import stages
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.pictures.findings import CURVE, POINTS, finding_figure
+from hil.diagnosis.pictures.findings import finding_figure
+CURVE=POINTS=""
 from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.initial_values import axis_facts

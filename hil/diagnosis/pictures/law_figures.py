@@ -1,0 +1,169 @@
+"""Figures of a law over one quantity: the curve through its points, and what is left before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hil.arrays import FloatArray
+from hil.diagnosis.pictures.fitted_law import FINE, Means, Rows, bin_edges, means
+from hil.diagnosis.pictures.laws import Law
+from hil.diagnosis.pictures.view import Captioned, Drawer, View
+from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
+from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
+from hil.quantities import digits, reading_unit
+
+if TYPE_CHECKING:
+    from hil.diagnosis.diagnosis import Diagnosis
+
+BINS, BINS_OF_PERIOD = 40, 24
+MEASURED_LABEL, LAW_LABEL, BARE_LABEL = "measured, ± 2 standard errors", "fitted law", "without it"
+BEFORE_LABEL, AFTER_LABEL = "before", "after"
+ORDERS = 1500  # of a spectrum
+SPECTRUM_ROWS = 20_000
+PASSED_HZ = 60.0  # by the mean of the disturbance
+
+
+def law_picture(law: Law) -> Drawer:
+    """Make the picture of a law: folded on its period beside the spectrum, or over the whole quantity."""
+
+    def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
+        period = law.period(views[0].term)
+        rows = [law.rows(diagnosis, view) for view in views]
+        if period is None or not any(one.used.any() for one in rows):
+            return _over_all(law, diagnosis, views, rows)
+        return _folded(law, diagnosis, views, rows, period)
+
+    return picture
+
+
+def _over_all(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[Rows]) -> Captioned:
+    """Draw the law over the whole quantity; below, what is left before and after."""
+    term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
+    edges = bin_edges(rows, BINS)
+    found, fine = means(rows, edges), np.linspace(edges[0], edges[-1], FINE)
+    figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    along, x_unit = reading_unit(law.over.unit(diagnosis), float(np.abs(edges).max()))
+    curve, at_points = law.value(term, diagnosis, fine), law.value(term, diagnosis, found.x)
+    if np.any(law.bare(fine)):
+        factor = reading_unit(unit, float(np.abs(curve).max())).factor
+        above.plot(
+            along * fine, factor * law.bare(fine), color=COMMAND, linestyle="--", linewidth=1.0, label=BARE_LABEL
+        )
+    _law(above, along * fine, curve, along * found.x, at_points + found.after, found.error, unit, label)
+    _left(below, along, found, unit)
+    below.set_xlabel(f"{law.over.label} [{x_unit}]")
+    return Captioned(
+        figure,
+        f"{_capital(label)} over {law.over.label}: the fitted law as a curve; each point is the mean of what was "
+        "measured of it, all else that the twin knows taken off. Below: what the twin leaves without it and with it.",
+    )
+
+
+def _folded(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[Rows], period: float) -> Captioned:
+    """Draw the law within one period beside the spectrum over the order."""
+    term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
+    folded = [Rows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used) for one in rows]
+    found = means(folded, np.linspace(0.0, period, BINS_OF_PERIOD + 1))
+    fine = np.linspace(0.0, period, FINE)
+    figure = Figure(figsize=(WIDTH_IN, 6.2), layout="constrained")
+    mosaic = figure.subplot_mosaic([["law", "spectrum"], ["left", "spectrum"]], height_ratios=(3, 2))
+    above, below, beside = mosaic["law"], mosaic["left"], mosaic["spectrum"]
+    along, x_unit = reading_unit(law.over.unit(diagnosis), period)
+    if x_unit == "rad" or x_unit == "mrad":
+        along, x_unit = 180.0 / np.pi, "°"
+    curve, at_points = law.value(term, diagnosis, fine), law.value(term, diagnosis, found.x)
+    _law(above, along * fine, curve, along * found.x, at_points + found.after, found.error, unit, label)
+    _left(below, along, found, unit)
+    below.set_xlabel(f"{law.over.label} within one period [{x_unit}]")
+    below.sharex(above)
+    _spectrum(beside, law, rows, views, period, unit)
+    return Captioned(
+        figure,
+        f"{_capital(label)} folded on one period of {digits(along * period)} {x_unit}: the fitted law as a curve; each "
+        "point is the mean of what was measured of it, all else that the twin knows taken off. Below: what the twin "
+        "leaves without it and with it. Right: amplitude of what it leaves over the order.",
+    )
+
+
+def _law(
+    axis: Axes,
+    x: FloatArray,
+    curve: FloatArray,
+    at: FloatArray,
+    points: FloatArray,
+    error: FloatArray,
+    unit: str,
+    label: str,
+) -> None:
+    factor, name = reading_unit(unit, float(np.abs(curve).max()))
+    _points(axis, at, factor * points, factor * error, MEASURED_LABEL)
+    axis.plot(x, factor * curve, color=SIMULATED, linewidth=1.8, label=LAW_LABEL, zorder=3)
+    style_axis(axis, f"{label} [{name}]")
+    legend_above(axis)
+
+
+def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
+    factor, name = reading_unit(unit, float(np.abs(found.before).max()))
+    axis.axhline(0.0, color="black", linewidth=0.8)
+    axis.plot(
+        along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label=BEFORE_LABEL
+    )
+    _points(axis, along * found.x, factor * found.after, factor * found.error, AFTER_LABEL)
+    style_axis(axis, f"left [{name}]")
+    legend_above(axis)
+
+
+def _points(axis: Axes, x: FloatArray, y: FloatArray, error: FloatArray, label: str) -> None:
+    axis.errorbar(x, y, 2.0 * error, fmt="o", color=MEASURED, markersize=3.5, linewidth=1.0, label=label, zorder=2)
+
+
+def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], views: Sequence[View], period: float, unit: str) -> None:
+    """Draw the amplitude of what is left over the order, before and after."""
+    order = law.over.per_unit / period
+    orders, before, after = spectra(law, rows, views, order)
+    factor, name = reading_unit(unit, float(before.max()))
+    axis.fill_between(orders, 0.0, factor * before, color=COMMAND, alpha=0.45, linewidth=0.0, label=BEFORE_LABEL)
+    axis.plot(orders, factor * after, color=MEASURED, linewidth=1.0, label=AFTER_LABEL)
+    axis.set_xlim(0.0, orders[-1])
+    axis.set_ylim(0.0, None)
+    axis.axvline(order, color=DEVIATION, linewidth=1.0, linestyle=":", label=digits(order))
+    label = law.over.per if "[" in law.over.per else f"cycles {law.over.per}"
+    style_axis(axis, f"amplitude [{name}]", label)
+    legend_above(axis)
+
+
+def spectra(
+    law: Law, rows: Sequence[Rows], views: Sequence[View], order: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Orders (m,) and amplitudes (m,) of the residuals there before and after, by regression on the carrier."""
+    highest = 2.0 * order + 1.0
+    turns, carrier, before, after = [], [], [], []
+    for one, view in zip(rows, views, strict=True):
+        x = one.x / law.over.per_unit
+        slow = np.abs(np.gradient(x, view.run.period_s)) * order < PASSED_HZ
+        used = one.used & slow if np.count_nonzero(one.used & slow) > 1000 else one.used
+        turns.append(x[used])
+        carrier.append(one.carrier[used])
+        before.append(one.before[used])
+        after.append(one.after[used])
+    angle, c = 2.0 * np.pi * np.concatenate(turns), np.concatenate(carrier)
+    step = max(angle.size // SPECTRUM_ROWS, 1)
+    span = max(float(np.ptp(one)) for one in turns)
+    spacing = max(0.25 / max(span, 1e-12), highest / ORDERS)
+    orders = np.arange(1, int(highest / spacing) + 1) * spacing
+    orders = np.sort(np.append(orders, order))
+    left = [np.concatenate(one) for one in (before, after)]
+    left = [(one - c * float(c @ one) / float(c @ c)) * c for one in left]
+    angle, left, weight = angle[::step], [one[::step] for one in left], float(np.sum(c[::step] ** 2))
+    found = np.array([[abs(np.exp(-1j * n * angle) @ one) for one in left] for n in orders]) * 2.0 / weight
+    return orders, found[:, 0], found[:, 1]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -59,6 +59,7 @@ _READ_IN: dict[str, tuple[tuple[float, float, str], ...]] = {
     "N m": ((0.1, 1.0, "N m"), (0.0, 1e3, "mN m")),
     "N/m": ((1e5, 1e-6, "N/µm"), (0.0, 1.0, "N/m")),
     "1": ((0.0, 100.0, "%"),),
+    "m/m": ((0.0, 1e6, "µm/m"),),
     "1/rev": ((0.0, 1.0, ""),),  # the sentence says what is counted
 }
 

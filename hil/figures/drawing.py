@@ -1,6 +1,6 @@
 """Matplotlib figures in the style of every report. Matplotlib is loaded when this module is."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -67,6 +67,13 @@ def legend_above(axis: Axes, handles: Sequence[object] | None = None) -> None:
         frameon=False,
         borderaxespad=0.2,
     )
+
+
+def legend_outside(figure: Figure, axes: Iterable[Axes], columns: int = 4) -> None:
+    """Put one legend above all axes of a figure, each label once."""
+    labelled = [axis.get_legend_handles_labels() for axis in axes]
+    known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
+    figure.legend(known.values(), known.keys(), loc="outside upper center", ncols=columns, frameon=False)
 
 
 def save(figure: Figure, path: Path) -> Path:

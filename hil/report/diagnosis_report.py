@@ -10,9 +10,11 @@ from hil.diagnosis.pictures.findings import finding_figure, term_of
 from hil.diagnosis.pictures.location import residual_panels
 from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
 from hil.diagnosis.pictures.structure import structure_figure
+from hil.diagnosis.preparation.split import whole_name
 from hil.diagnosis.result import Finding, FitFigures, Result, TorqueLeft, Value, Verdict
+from hil.diagnosis.statement import explained
 from hil.diagnosis.turning import of_load
-from hil.diagnosis.wording import label, title, titles, where
+from hil.diagnosis.wording import label, spoken, title, titles, where
 from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.motion.profile import write_profile
@@ -41,9 +43,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] =
     `assumed` of recordings and bench is told on the page, so that a reader can correct it.
     """
     result = diagnosis.result
-    names = ", ".join(run.name for run in diagnosis.train.runs)
-    good = result.verdict is not Verdict.UNEXPLAINED and result.time_budget is None
-    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, good)
+    names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))
+    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result))
     for index in range(len(result.findings)):
         _finding(page, diagnosis, index, folder)
     _change(page, diagnosis, folder)
@@ -57,8 +58,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] =
         )
         page.picture(
             save(diagnosis.plot("location"), folder / "location.png"),
-            "Energy of the mismatch above the noise. The input of each block is the measured one, so that a mismatch "
-            "shows only in the block that causes it; energy over position and speed is the mean per sample.",
+            "Energy of the mismatch above the noise, by the channel that shows it, the phase of motion, and the mean per "
+            "sample over position, speed and time.",
         )
     _fit(page, diagnosis, folder)
     _corrections(page, result)
@@ -66,6 +67,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] =
     page.text(result.unexplained.description)
     if result.unexplained.share > 0.0:
         page.text(f"Unexplained: {percent(result.unexplained.share)} of the energy above the noise.")
+    page.items([f"{one.text[:1].upper()}{one.text[1:]}." for one in result.structure])
     _structure(page, diagnosis, folder)
     page.heading("What this motion cannot show")
     page.text(
@@ -106,7 +108,11 @@ def _structure(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
 
 def _lead(diagnosis: Diagnosis) -> str:
     seconds = sum(run.motor.size * run.period_s for run in diagnosis.train.runs)
-    held_out = ", ".join(run.name for run in diagnosis.held_out.runs) or "nothing"
+    whole = {whole_name(run.name) for run in diagnosis.train.runs}
+    held_out = ", ".join(
+        "its last part" if whole == {whole_name(run.name)} else run.name for run in diagnosis.held_out.runs
+    )
+    held_out = held_out or "nothing"
     bench = f"bench {diagnosis.given_bench.name} ({diagnosis.given_bench.axis.model})"
     ended = " · ended by its time budget, see How it was judged" if diagnosis.result.time_budget else ""
     return f"{seconds:.1f} s of training, held out: {held_out} · {bench}{ended}"
@@ -176,7 +182,7 @@ def _fit(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     page.table(
         _FIT_HEADERS,
         [
-            (name, title(entry.mode), what, *_figures(found, entry.unit))
+            (spoken(name), title(entry.mode), what, *_figures(found, entry.unit))
             for name, entry in result.fit.items()
             for what, found in (("training", entry.train), ("held out", entry.validate_))
             if found is not None

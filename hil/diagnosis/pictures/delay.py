@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import Captioned, View, around, longest
-from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
 from hil.figures.panels import COMMAND, MEASURED, NOISE, SIMULATED
 from hil.identification.derivatives import motion
 from hil.identification.terms import Term
@@ -67,14 +67,13 @@ def cross_correlation(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     top = float(fine.lag_s[np.argmax(fine.after)])
     mosaic["peak"].axvline(factor * top, color=SIMULATED, linewidth=0.8, linestyle=":")
     name, of = pair.names
-    style_axis(mosaic["peak"], "cross-correlation", f"lag of {name} behind {of} [{unit}]")
+    style_axis(mosaic["peak"], "cross-correlation", f"lag of {name}\nbehind {of} [{unit}]")
     mosaic["left"].axhspan(-BAND * found.error, BAND * found.error, color=NOISE, alpha=0.35, label="99 % of chance")
-    for values, colour, label in ((found.before, COMMAND, "before"), (found.after, SIMULATED, "after")):
+    for values, colour, label in ((found.before, COMMAND, "twin before"), (found.after, SIMULATED, "twin after")):
         mosaic["left"].plot(factor * found.lag_s, found.measured - values, ".-", color=colour, label=label)
     style_axis(mosaic["left"], "measured - twin", f"lag [{unit}]")
     _change(mosaic["change"], pair, view)
-    for axis in mosaic.values():
-        legend_above(axis)
+    legend_outside(figure, mosaic.values(), 5)
     return Captioned(
         figure,
         f"Cross-correlation of the rate of {name} with that of {of}: the twin after has its peak at "
@@ -110,7 +109,7 @@ def _rate(values: FloatArray, view: View) -> FloatArray:
 
 def _pair(diagnosis: Diagnosis, view: View) -> Pair:
     """The signals in which the term is largest; of a torque that is not measured, the one that the motion shows."""
-    run, channel = view.run, view.strongest
+    run, channel = view.run, view.shows_delay
     before, after = view.residuals(channel)
     drive = diagnosis.given_bench.axis.drive_unit
     force = "force" if diagnosis.given_bench.axis.linear else "torque"

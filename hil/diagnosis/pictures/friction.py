@@ -12,7 +12,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.pictures.fitted_law import FINE, Rows, bin_edges, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.turning import speed_unit
-from hil.figures.drawing import WIDTH_IN, style_axis
+from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED
 from hil.identification.estimator import Fit
 from hil.identification.terms import Term
@@ -71,7 +71,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     style_axis(left_log, "", f"speed of the table [{unit_of_speed}], logarithmic")
     for axis in (left, left_log):
         axis.axhline(0.0, color="black", linewidth=0.8)
-    figure.legend(*linear.get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
+    legend_outside(figure, (linear,), 3)
     return Captioned(
         figure,
         "Friction over speed: the fitted law as a curve, the law before as a dashed line; each point is the mean of "

@@ -14,7 +14,7 @@ from hil.diagnosis.pictures.fitted_law import FINE, Rows, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View, longest, unit_of_channel
 from hil.diagnosis.search.disturbance import smooth
 from hil.diagnosis.turning import speed_unit
-from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
@@ -25,7 +25,7 @@ from hil.twin.mechanism import Stage
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
 
-POINTS = 60  # of a loop
+POINTS, ROWS_PER_POINT = 80, 8  # of a loop: a curve between its points shows its corners
 BINS = 30
 WAYS = 12.0  # travel on either side of a reversal, over the width of the hysteresis
 LEAST_WAY_M = 20e-6
@@ -57,8 +57,7 @@ def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     _loop(left, diagnosis, view, loop, "table - motor position", unit)
     shown = BY_ID[view.term.effect].variants[view.term.variant].stage is Stage.TRANSMISSION
     (_over_load if shown else _over_speed)(right, diagnosis, views, unit)
-    legend_above(left)
-    legend_above(right)
+    legend_outside(figure, (left, right), 5)
     over = "the load, given as the deflection that it would make without it" if shown else "the speed of the table"
     return Captioned(
         figure,
@@ -89,7 +88,7 @@ def friction_loop(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     ):
         right.plot(run.time_s[rows], factor * values[rows], color=colour, label=label, **look)
     style_axis(right, f"friction [{name}]", "time [s]")
-    legend_above(left)
+    legend_outside(figure, (left,))
     return Captioned(
         figure,
         "Friction (torque less inertia × acceleration) at a reversal, over the position and over time: measured points "
@@ -124,15 +123,18 @@ def _loop(axis: Axes, diagnosis: Diagnosis, view: View, loop: Loop, label: str, 
     run, rows = view.run, loop.rows
     position = diagnosis.given_bench.axis.ratio_m_rad * run.motor
     position = position - float(position[rows].min())
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
-    used = np.zeros(way.size, dtype=bool)
-    used[rows] = True
-    left = loop.measured - loop.after
-    one = Rows(way, np.ones(way.size), loop.measured, left, used)
-    found = means([one], np.linspace(way[rows][0], way[rows][-1], POINTS + 1))
-    where = means(
-        [Rows(way, np.ones(way.size), position, left, used)], np.linspace(way[rows][0], way[rows][-1], POINTS + 1)
+    used, row, one = (
+        np.zeros(run.motor.size, dtype=bool),
+        np.arange(run.motor.size, dtype=float),
+        np.ones(run.motor.size),
     )
+    used[rows] = True
+    count = int(np.clip((rows.stop - rows.start) // ROWS_PER_POINT, 4, POINTS))
+    found = means(
+        [Rows(row, one, loop.before, loop.measured - loop.after, used)], np.linspace(*row[rows][[0, -1]], count + 1)
+    )
+    middle = np.round(found.x).astype(int)
+    points = loop.after[middle] + found.after
     along, x_unit = reading_unit("rad" if diagnosis.given_bench.axis.turns else "m", float(position[rows].max()))
     factor, name = reading_unit(unit, float(np.abs(loop.after[rows]).max()))
     for values, colour, width, text in (
@@ -141,7 +143,7 @@ def _loop(axis: Axes, diagnosis: Diagnosis, view: View, loop: Loop, label: str, 
     ):
         axis.plot(along * position[rows], factor * values[rows], color=colour, linewidth=width, label=text)
     look = {"fmt": "o", "color": MEASURED, "markersize": 3.5, "linewidth": 1.0}
-    axis.errorbar(along * where.before, factor * found.before, 2.0 * factor * found.error, label="measured", **look)
+    axis.errorbar(along * position[middle], factor * points, 2.0 * factor * found.error, label="measured", **look)
     style_axis(axis, f"{label} [{name}]", f"motor position [{x_unit}]")
 
 

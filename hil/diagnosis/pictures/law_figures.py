@@ -13,7 +13,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.pictures.fitted_law import FINE, Means, Rows, bin_edges, means
 from hil.diagnosis.pictures.laws import Law
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
-from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
 from hil.quantities import digits, reading_unit
 
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
 
 BINS, BINS_OF_PERIOD = 40, 24
-MEASURED_LABEL, LAW_LABEL, BARE_LABEL = "measured, ± 2 standard errors", "fitted law", "without it"
-BEFORE_LABEL, AFTER_LABEL = "before", "after"
+MEASURED_LABEL, LAW_LABEL, BARE_LABEL = "measured, ± 2 σ", "fitted law", "without it"
 ORDERS = 1500  # of a spectrum
 SPECTRUM_ROWS = 20_000
 PASSED_HZ = 60.0  # by the mean of the disturbance
@@ -58,6 +57,7 @@ def _over_all(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Seque
     _law(above, along * fine, curve, along * found.x, at_points + found.after, found.error, unit, label)
     _left(below, along, found, unit)
     below.set_xlabel(f"{law.over.label} [{x_unit}]")
+    legend_outside(figure, (above, below), 5)
     return Captioned(
         figure,
         f"{_capital(label)} over {law.over.label}: the fitted law as a curve; each point is the mean of what was "
@@ -83,6 +83,7 @@ def _folded(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequenc
     below.set_xlabel(f"{law.over.label} within one period [{x_unit}]")
     below.sharex(above)
     _spectrum(beside, law, rows, views, period, unit)
+    legend_outside(figure, (above, beside), 5)
     return Captioned(
         figure,
         f"{_capital(label)} folded on one period of {digits(along * period)} {x_unit}: the fitted law as a curve; each "
@@ -104,23 +105,21 @@ def _law(
     factor, name = reading_unit(unit, float(np.abs(curve).max()))
     _points(axis, at, factor * points, factor * error, MEASURED_LABEL)
     axis.plot(x, factor * curve, color=SIMULATED, linewidth=1.8, label=LAW_LABEL, zorder=3)
-    style_axis(axis, f"{label} [{name}]")
-    legend_above(axis)
+    style_axis(axis, f"{label}\n[{name}]")
 
 
 def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
     factor, name = reading_unit(unit, float(np.abs(found.before).max()))
     axis.axhline(0.0, color="black", linewidth=0.8)
     axis.plot(
-        along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label=BEFORE_LABEL
+        along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label="left before"
     )
-    _points(axis, along * found.x, factor * found.after, factor * found.error, AFTER_LABEL)
-    style_axis(axis, f"left [{name}]")
-    legend_above(axis)
+    _points(axis, along * found.x, factor * found.after, factor * found.error, MEASURED_LABEL)
+    style_axis(axis, f"left\n[{name}]")
 
 
 def _points(axis: Axes, x: FloatArray, y: FloatArray, error: FloatArray, label: str) -> None:
-    axis.errorbar(x, y, 2.0 * error, fmt="o", color=MEASURED, markersize=3.5, linewidth=1.0, label=label, zorder=2)
+    axis.errorbar(x, y, 2.0 * error, fmt="o", color=MEASURED, markersize=3.5, linewidth=1.0, label=label, zorder=4)
 
 
 def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], views: Sequence[View], period: float, unit: str) -> None:
@@ -128,21 +127,19 @@ def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], views: Sequence[View],
     order = law.over.per_unit / period
     orders, before, after = spectra(law, rows, views, order)
     factor, name = reading_unit(unit, float(before.max()))
-    axis.fill_between(orders, 0.0, factor * before, color=COMMAND, alpha=0.45, linewidth=0.0, label=BEFORE_LABEL)
-    axis.plot(orders, factor * after, color=MEASURED, linewidth=1.0, label=AFTER_LABEL)
-    axis.set_xlim(0.0, orders[-1])
+    axis.fill_between(orders, 0.0, factor * before, color=COMMAND, alpha=0.45, linewidth=0.0, label="left before")
+    axis.plot(orders, factor * after, color=MEASURED, linewidth=1.0, label="left after")
+    axis.set_xlim(orders[0], orders[-1])
     axis.set_ylim(0.0, None)
-    axis.axvline(order, color=DEVIATION, linewidth=1.0, linestyle=":", label=digits(order))
+    axis.axvline(order, color=DEVIATION, linewidth=1.0, linestyle=":")
     label = law.over.per if "[" in law.over.per else f"cycles {law.over.per}"
-    style_axis(axis, f"amplitude [{name}]", label)
-    legend_above(axis)
+    style_axis(axis, f"amplitude of what is left [{name}]", label)
 
 
 def spectra(
     law: Law, rows: Sequence[Rows], views: Sequence[View], order: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Orders (m,) and amplitudes (m,) of the residuals there before and after, by regression on the carrier."""
-    highest = 2.0 * order + 1.0
     turns, carrier, before, after = [], [], [], []
     for one, view in zip(rows, views, strict=True):
         x = one.x / law.over.per_unit
@@ -155,8 +152,9 @@ def spectra(
     angle, c = 2.0 * np.pi * np.concatenate(turns), np.concatenate(carrier)
     step = max(angle.size // SPECTRUM_ROWS, 1)
     span = max(float(np.ptp(one)) for one in turns)
-    spacing = max(0.25 / max(span, 1e-12), highest / ORDERS)
-    orders = np.arange(1, int(highest / spacing) + 1) * spacing
+    spacing = 0.25 / max(span, 1e-12)  # a line is four of them wide
+    most = ORDERS / 2 * spacing
+    orders = np.arange(order - min(order, most) + spacing, order + min(max(order, 1.0), most), spacing)
     orders = np.sort(np.append(orders, order))
     left = [np.concatenate(one) for one in (before, after)]
     left = [(one - c * float(c @ one) / float(c @ c)) * c for one in left]

@@ -38,7 +38,8 @@ class Axis:
 class Law:
     """How a law is drawn: over which quantity, in which channel, and by which factor it enters the residual there.
 
-    `value(term, diagnosis, x)` is the law (n,) in the unit `unit`. `bare` is what it is without the mechanism.
+    `value(term, diagnosis, x)` is the law (n,) in the unit `unit`. `bare` is what it is without the mechanism;
+    `centred`: it multiplies a position, which has no zero.
     """
 
     over: Axis
@@ -48,6 +49,7 @@ class Law:
     channel: Callable[[View], str] = lambda view: "motor"
     carrier: Callable[[Diagnosis, View], FloatArray] = lambda diagnosis, view: np.ones(view.run.motor.size)
     period: Callable[[Term], float | None] = lambda term: None
+    centred: bool = False
     bare: Callable[[FloatArray], FloatArray] = np.zeros_like
 
     def rows(self, diagnosis: Diagnosis, view: View) -> Rows:
@@ -56,6 +58,8 @@ class Law:
         carrier = self.carrier(diagnosis, view)
         used = view.torque.sliding & (np.abs(carrier) > LEAST_SHARE * float(np.abs(carrier).max()))
         used[: view.run.evaluated.start] = False
+        if self.centred:  # the zeros of both encoders are arbitrary
+            carrier, before = (values - float(np.mean(values[used])) for values in (carrier, before))
         return Rows(self.over.of(diagnosis, view), carrier, before, after, used)
 
     def labelled(self, diagnosis: Diagnosis, view: View) -> tuple[str, str]:
@@ -167,6 +171,7 @@ GROWTH = Law(
     "m/m",
     channel=_table,
     carrier=_position,
+    centred=True,
 )
 MOTOR_READING = Law(
     ANGLE,

@@ -12,7 +12,8 @@ from hil.arrays import FloatArray
 from hil.diagnosis import stages
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
-CURVE=POINTS=""
+
+CURVE = POINTS = ""
 from hil.diagnosis.pictures.view import around
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.initial_values import axis_facts
@@ -37,7 +38,7 @@ def diagnosis_of(effect: str, times: float = 3.0) -> Diagnosis:
     """A right diagnosis of an effect of some times the strength that an engineer would call a defect."""
     run = take(recorded(OWNER), OWNER)
     values = list(BY_ID[effect].typical_values(axis_facts(OWNER, [run])))
-    as_it_is = ("presliding_hysteresis", "structural_mode", "preload_loss", "stribeck_friction")
+    as_it_is = ("presliding_hysteresis", "structural_mode", "preload_loss", "stribeck_friction", "transport_delay")
     values[0] *= 1.0 if effect in as_it_is else times
     for name, value in WITHIN_THE_RECORDING.get(effect, {}).items():
         values[BY_ID[effect].names.index(name)] = value

@@ -30,10 +30,10 @@ _FIT_HEADERS = (
     "how",
     "recordings",
     "bench file",
-    "before: parameters refitted",
+    "before (refitted)",
     "after",
-    "noise floor",
-    "after / floor",
+    "noise",
+    "after / noise",
 )
 
 
@@ -58,8 +58,8 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] =
         )
         page.picture(
             save(diagnosis.plot("location"), folder / "location.png"),
-            "Energy of the mismatch above the noise, by the channel that shows it, the phase of motion, and the mean per "
-            "sample over position, speed and time.",
+            "Energy of the mismatch above the noise: by channel, by phase of motion, and its mean "
+            "per sample over position, speed and time.",
         )
     _fit(page, diagnosis, folder)
     _corrections(page, result)

@@ -10,12 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.view import Captioned, View, around, longest
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
-from hil.figures.panels import COMMAND, MEASURED, NOISE, SIMULATED
+from hil.figures.panels import NOISE
 from hil.identification.derivatives import motion
 from hil.identification.terms import Term
-from hil.quantities import quantity, reading_unit
+from hil.quantities import reading_unit
 from hil.twin.library import BY_ID
 
 if TYPE_CHECKING:
@@ -57,28 +58,21 @@ def cross_correlation(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
     mosaic = figure.subplot_mosaic([["peak", "left"], ["change", "change"]])
     factor, unit = reading_unit("s", float(found.lag_s[-1]))
-    for values, colour, width, label in (
-        (fine.before, COMMAND, 1.2, "twin before"),
-        (fine.after, SIMULATED, 1.8, "twin after"),
-    ):
-        mosaic["peak"].plot(factor * fine.lag_s, values, color=colour, linewidth=width, label=label)
-    look = {"fmt": "o", "color": MEASURED, "markersize": 3.5, "linewidth": 1.0}
-    mosaic["peak"].errorbar(factor * found.lag_s, found.measured, 2.0 * found.error, label="measured", **look)
-    top = float(fine.lag_s[np.argmax(fine.after)])
-    mosaic["peak"].axvline(factor * top, color=SIMULATED, linewidth=0.8, linestyle=":")
+    looks.twin(mosaic["peak"], factor * fine.lag_s, fine.before, "before")
+    looks.twin(mosaic["peak"], factor * fine.lag_s, fine.after, "after")
+    looks.points(mosaic["peak"], factor * found.lag_s, found.measured, found.error)
     name, of = pair.names
     style_axis(mosaic["peak"], "cross-correlation", f"lag of {name}\nbehind {of} [{unit}]")
     mosaic["left"].axhspan(-BAND * found.error, BAND * found.error, color=NOISE, alpha=0.35, label="99 % of chance")
-    for values, colour, label in ((found.before, COMMAND, "twin before"), (found.after, SIMULATED, "twin after")):
-        mosaic["left"].plot(factor * found.lag_s, found.measured - values, ".-", color=colour, label=label)
+    looks.twin(mosaic["left"], factor * found.lag_s, found.measured - found.before, "before")
+    looks.twin(mosaic["left"], factor * found.lag_s, found.measured - found.after, "after")
     style_axis(mosaic["left"], "measured - twin", f"lag [{unit}]")
     _change(mosaic["change"], pair, view)
     legend_outside(figure, mosaic.values(), 5)
     return Captioned(
         figure,
-        f"Cross-correlation of the rate of {name} with that of {of}: the twin after has its peak at "
-        f"{quantity(top, 's')}. Right: what each twin leaves of it, with the band of chance. Below: both at the "
-        "fastest change.",
+        f"Cross-correlation of the rate of {name} with that of {of}: a delay moves its peak, a lag bends it. Right: "
+        "what each twin leaves of it, with the band of chance. Below: both at the fastest change.",
     )
 
 
@@ -91,11 +85,16 @@ def correlation(pair: Pair, view: View, finer: int = 1) -> Correlation:
     scale = float(np.linalg.norm(rates[0]) * np.linalg.norm(rates[1]))
     most = round(max(LEAST_S, SHOWN * _late_s(view.term)) / run.period_s) * finer
     lags = np.arange(-most, most + 1)
-    of = [finer * np.fft.irfft(np.conj(spectra[0]) * other, finer * size)[lags] / scale for other in spectra[1:]]
-    # variance of the cross-correlation of two independent signals (Bartlett), of the input and what is left
-    left = np.abs(spectra[1] - spectra[3]) ** 2
-    power = np.sum(np.abs(spectra[0]) ** 2 * left) * 2.0 / size / rates[0].size
-    return Correlation(lags * run.period_s / finer, *of, error=float(np.sqrt(power)) / scale)
+    measured, before, after = (
+        finer * np.fft.irfft(np.conj(spectra[0]) * other, finer * size)[lags] / scale for other in spectra[1:]
+    )
+    # variance of the cross-correlation of two independent signals (Bartlett): of what is left that has neither the
+    # shape of the signal nor of a delay of it, and of the signal
+    shapes = np.stack([rates[0], np.gradient(rates[0])])
+    left = rates[1] - rates[3]
+    left = left - np.linalg.lstsq(shapes.T, left, rcond=None)[0] @ shapes
+    power = np.sum(np.abs(spectra[0]) ** 2 * np.abs(np.fft.rfft(left, size)) ** 2) * 2.0 / size / left.size
+    return Correlation(lags * run.period_s / finer, measured, before, after, float(np.sqrt(power)) / scale)
 
 
 def _late_s(term: Term) -> float:
@@ -130,20 +129,16 @@ def _pair(diagnosis: Diagnosis, view: View) -> Pair:
 def _change(axis: Axes, pair: Pair, view: View) -> None:
     """Draw the signals at the fastest change of the one that is followed."""
     run = view.run
-    rate = np.abs(motion(pair.followed, run.period_s, SMOOTH_S).velocity)
-    if pair.unit == "m":  # positions: their speed is shown, at its fastest change
-        pair = pair._replace(
-            **{name: motion(getattr(pair, name), run.period_s, SMOOTH_S).velocity for name in pair._fields[:4]},
-            unit="m/s",
-        )
-        rate = np.abs(motion(pair.followed, run.period_s, SMOOTH_S).velocity)
-    rows = around(int(np.argmax(rate[run.evaluated])) + run.evaluated.start, run, STEEPEST_S)
-    factor, unit = reading_unit(pair.unit, float(np.abs(pair.signal[rows]).max()))
-    for values, colour, look, label in (
-        (pair.signal, MEASURED, {"linewidth": 2.6, "alpha": 0.5}, "measured"),
-        (pair.before, COMMAND, {"linewidth": 1.0}, "twin before"),
-        (pair.after, SIMULATED, {"linewidth": 1.2}, "twin after"),
-    ):
-        axis.plot(run.time_s[rows], factor * values[rows], color=colour, label=label, **look)
+    signals, unit = [pair.followed, pair.signal, pair.before, pair.after], pair.unit
+    rates = [motion(values, run.period_s, SMOOTH_S).velocity for values in signals]
+    if unit == "m":  # of positions the speed is shown, at its fastest change
+        signals, unit = rates, "m/s"
+        rates = [motion(values, run.period_s, SMOOTH_S).velocity for values in signals]
+    rows = around(int(np.argmax(np.abs(rates[0])[run.evaluated])) + run.evaluated.start, run, STEEPEST_S)
+    factor, unit = reading_unit(unit, float(np.abs(signals[1][rows]).max()))
+    measured, before, after = (factor * values[rows] for values in signals[1:])
+    looks.trace(axis, run.time_s[rows], measured)
+    looks.twin(axis, run.time_s[rows], before, "before")
+    looks.twin(axis, run.time_s[rows], after, "after")
     name = pair.names[0].removeprefix("the ").replace("position", "speed")
     style_axis(axis, f"{name} [{unit}]", "time [s]")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hil.diagnosis.pictures import laws
 from hil.diagnosis.pictures.delay import cross_correlation
 from hil.diagnosis.pictures.friction import friction_over_speed
 from hil.diagnosis.pictures.hysteresis import friction_loop, lost_motion
 from hil.diagnosis.pictures.law_figures import law_picture
+from hil.diagnosis.pictures.laws import LAWS
 from hil.diagnosis.pictures.over_time import residual_over_time
 from hil.diagnosis.pictures.response import frequency_response
 from hil.diagnosis.pictures.view import Captioned, Drawer, view_of
@@ -29,20 +29,7 @@ PICTURES: dict[Picture, Drawer] = {
     Picture.LOST_MOTION: lost_motion,
     Picture.DELAY: cross_correlation,
     Picture.RESPONSE: frequency_response,
-    Picture.COGGING: law_picture(laws.COGGING),
-    Picture.RIPPLE: law_picture(laws.RIPPLE),
-    Picture.LEAD_OVER_TURN: law_picture(laws.LEAD_OVER_TURN),
-    Picture.LEAD_OVER_TRAVEL: law_picture(laws.LEAD_OVER_TRAVEL),
-    Picture.GROWTH: law_picture(laws.GROWTH),
-    Picture.MOTOR_READING: law_picture(laws.MOTOR_READING),
-    Picture.LOAD_READING: law_picture(laws.LOAD_READING),
-    Picture.SCALE_READING: law_picture(laws.SCALE_READING),
-    Picture.FRICTION_OVER_TRAVEL: law_picture(laws.FRICTION_OVER_TRAVEL),
-    Picture.FRICTION_OVER_TIME: law_picture(laws.FRICTION_OVER_TIME),
-    Picture.FORCE_OVER_TRAVEL: law_picture(laws.FORCE_OVER_TRAVEL),
-    Picture.FORCE_OVER_TIME: law_picture(laws.FORCE_OVER_TIME),
-    Picture.STIFFNESS: law_picture(laws.STIFFNESS),
-    Picture.CHARACTERISTIC: law_picture(laws.CHARACTERISTIC),
+    **{picture: law_picture(law) for picture, law in LAWS.items()},
 }
 
 
@@ -50,7 +37,11 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
     """Draw the evidence for a term of the final hypothesis, on all recordings: a law needs every feed and position."""
     runs = (*diagnosis.train.runs, *diagnosis.held_out.runs)
     views = [view_of(diagnosis, run, term) for run in runs]
-    figure, caption = PICTURES[BY_ID[term.effect].text.picture](diagnosis, views)
+    wanted = BY_ID[term.effect].text.picture
+    slides = any(view.torque.sliding[view.run.evaluated].any() for view in views)
+    if not slides or (wanted is Picture.LOST_MOTION and not views[0].has_table):  # no law can be drawn of that
+        wanted = Picture.TIME
+    figure, caption = PICTURES[wanted](diagnosis, views)
     return Captioned(labelled(figure, diagnosis.given_bench.axis.turns), caption)
 
 

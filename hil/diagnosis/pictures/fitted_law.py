@@ -24,6 +24,7 @@ from hil.twin.mechanism import PARAMETERS, WIDTH, Moment
 FINE = 600  # points of a curve: more than the pixels of a picture's half
 ROWS_PER_BIN = 60  # on average; a shorter recording gets wider bins
 FEWEST_ROWS = 8  # of a bin
+LEAST_VARIANCE = 0.01  # of a mean over that of independent rows, and of a bin over that of all
 LONGEST_ROWS = 400  # of the correlation counted in an error: noise of sensors and observer decays before
 
 
@@ -36,6 +37,7 @@ class Rows:
     before: FloatArray
     after: FloatArray
     used: NDArray[np.bool_]
+    resolution: float = 0.0  # of the residual over the carrier: an error that rows of one bin have in common
 
 
 class Means(NamedTuple):
@@ -89,7 +91,8 @@ def means(rows: Sequence[Rows], edges: FloatArray) -> Means:
 
     def sums(of: Sequence[FloatArray]) -> FloatArray:
         pairs = zip(at, inside, of, strict=True)
-        return np.sum([np.bincount(b[i], weights=v[i], minlength=count) for b, i, v in pairs], axis=0)
+        counts = [np.bincount(b[i], weights=v[i], minlength=count) for b, i, v in pairs]
+        return np.asarray(np.sum(counts, axis=0), dtype=np.float64)
 
     number = sums([np.ones(one.x.size) for one in rows])
     weight = np.maximum(sums([one.carrier**2 for one in rows]), 1e-300)
@@ -109,7 +112,10 @@ def means(rows: Sequence[Rows], edges: FloatArray) -> Means:
             both = i[lag:] & i[:-lag] & (b[lag:] == b[:-lag])
             product = one.carrier[lag:][both] * one.carrier[:-lag][both]
             variance += 2.0 * correlation[lag] * np.bincount(b[lag:][both], weights=product, minlength=count)
-    least = 0.05 * correlation[0] * weight  # a truncated correlation may sum to less than nothing
-    error = np.sqrt(np.maximum(variance, least)) / weight
+    least = LEAST_VARIANCE * correlation[0] * weight  # a truncated correlation may sum to less than nothing
+    # noise is not the same everywhere: a reversal, an end of the motion
+    local = sums([one.left**2 for one in noise]) / np.maximum(number, 1.0) / max(correlation[0], 1e-300)
+    error = np.sqrt(np.maximum(variance, least) * np.maximum(local, LEAST_VARIANCE)) / weight
+    error = np.hypot(error, max(one.resolution for one in rows))
     kept = number >= FEWEST_ROWS
     return Means(x[kept], before[kept], after[kept], error[kept])

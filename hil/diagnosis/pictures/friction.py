@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.fitted_law import FINE, Rows, bin_edges, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
-from hil.figures.panels import COMMAND, DEVIATION, MEASURED
+from hil.figures.panels import DEVIATION, MEASURED
 from hil.identification.estimator import Fit
 from hil.identification.terms import Term
 from hil.quantities import reading_unit
@@ -52,17 +53,14 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
                 edges, fine = np.geomspace(slowest, fastest, edges.size), np.geomspace(slowest, fastest, FINE)
             found = means(moving[sign], edges)
             points = friction_law(diagnosis.final, terms, sign, found.x) + found.after
-            look = {"fmt": marker, "color": colour, "markersize": 4, "linewidth": 1.0}
-            above.errorbar(
-                to_read * found.x, factor * points, 2.0 * factor * found.error, label=f"measured {name}", **look
-            )
+            x, error = to_read * found.x, factor * found.error
+            looks.points(above, x, factor * points, error, f"measured {name}", colour, marker)
             curve = friction_law(diagnosis.final, terms, sign, fine)
-            above.plot(to_read * fine, factor * curve, color=colour, linewidth=1.6, label=f"fitted law {name}")
-            below.plot(to_read * found.x, factor * found.before, "-", color=colour, linewidth=0.8, alpha=0.6)
-            below.errorbar(to_read * found.x, factor * found.after, 2.0 * factor * found.error, **look)
+            looks.law(above, to_read * fine, factor * curve, f"{looks.LAW} {name}", colour)
+            below.plot(x, factor * found.before, "-", color=colour, linewidth=0.8, alpha=0.6)
+            looks.points(below, x, factor * found.after, error, "", colour, marker)
     for axis, fine in ((linear, np.linspace(0.0, fastest, FINE)), (logarithmic, np.geomspace(slowest, fastest, FINE))):
-        without = friction_law(diagnosis.nominal, (), 1.0, fine)
-        axis.plot(to_read * fine, factor * without, color=COMMAND, linestyle="--", linewidth=1.2, label="before")
+        looks.without(axis, to_read * fine, factor * friction_law(diagnosis.nominal, (), 1.0, fine))
     for axis in (logarithmic, left_log):
         axis.set_xscale("log")
     style_axis(linear, f"friction [{unit}]")

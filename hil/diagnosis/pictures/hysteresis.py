@@ -10,12 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.fitted_law import FINE, Rows, law_at, means
-from hil.diagnosis.pictures.view import Captioned, View, longest, unit_of_channel
+from hil.diagnosis.pictures.view import Captioned, View, longest, noise, unit_of_channel
 from hil.diagnosis.search.disturbance import smooth
 from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
-from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
+from hil.figures.panels import DEVIATION
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
 from hil.quantities import reading_unit
@@ -39,6 +40,7 @@ class Loop(NamedTuple):
     measured: FloatArray
     before: FloatArray
     after: FloatArray
+    resolution: float = 0.0  # of the encoder: at rest its count does not change
 
 
 def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
@@ -50,7 +52,7 @@ def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     zero = float(np.mean((stretch - after)[run.evaluated]))  # the zero of the second encoder is arbitrary
     stretch = stretch - zero
     width = float(np.ptp(np.percentile((stretch - after)[run.evaluated], (2.0, 98.0))))
-    loop = Loop(reversal(diagnosis, run, width), stretch, stretch - before, stretch - after)
+    loop = Loop(reversal(diagnosis, run, width), stretch, stretch - before, stretch - after, noise(run, "table"))
     figure = Figure(figsize=(WIDTH_IN, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     unit = unit_of_channel(diagnosis, "table")
@@ -81,12 +83,9 @@ def friction_loop(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     unit = bench.axis.drive_unit
     _loop(left, diagnosis, view, loop, "friction", unit)
     factor, name = reading_unit(unit, float(np.abs(loop.after[rows]).max()))
-    for values, colour, look, label in (
-        (loop.measured, MEASURED, {"linewidth": 2.6, "alpha": 0.5}, "measured"),
-        (loop.before, COMMAND, {"linewidth": 1.0}, "twin before"),
-        (loop.after, SIMULATED, {"linewidth": 1.2}, "twin after"),
-    ):
-        right.plot(run.time_s[rows], factor * values[rows], color=colour, label=label, **look)
+    looks.trace(right, run.time_s[rows], factor * loop.measured[rows])
+    looks.twin(right, run.time_s[rows], factor * loop.before[rows], "before")
+    looks.twin(right, run.time_s[rows], factor * loop.after[rows], "after")
     style_axis(right, f"friction [{name}]", "time [s]")
     legend_outside(figure, (left,))
     return Captioned(
@@ -130,20 +129,15 @@ def _loop(axis: Axes, diagnosis: Diagnosis, view: View, loop: Loop, label: str, 
     )
     used[rows] = True
     count = int(np.clip((rows.stop - rows.start) // ROWS_PER_POINT, 4, POINTS))
-    found = means(
-        [Rows(row, one, loop.before, loop.measured - loop.after, used)], np.linspace(*row[rows][[0, -1]], count + 1)
-    )
+    edges = np.linspace(float(row[rows][0]), float(row[rows][-1]), count + 1)
+    found = means([Rows(row, one, loop.before, loop.measured - loop.after, used, loop.resolution)], edges)
     middle = np.round(found.x).astype(int)
     points = loop.after[middle] + found.after
     along, x_unit = reading_unit("rad" if diagnosis.given_bench.axis.turns else "m", float(position[rows].max()))
     factor, name = reading_unit(unit, float(np.abs(loop.after[rows]).max()))
-    for values, colour, width, text in (
-        (loop.before, COMMAND, 1.0, "twin before"),
-        (loop.after, SIMULATED, 1.6, "twin after"),
-    ):
-        axis.plot(along * position[rows], factor * values[rows], color=colour, linewidth=width, label=text)
-    look = {"fmt": "o", "color": MEASURED, "markersize": 3.5, "linewidth": 1.0}
-    axis.errorbar(along * position[middle], factor * points, 2.0 * factor * found.error, label="measured", **look)
+    looks.twin(axis, along * position[rows], factor * loop.before[rows], "before")
+    looks.twin(axis, along * position[rows], factor * loop.after[rows], "after")
+    looks.points(axis, along * position[middle], factor * points, factor * found.error)
     style_axis(axis, f"{label} [{name}]", f"motor position [{x_unit}]")
 
 
@@ -165,10 +159,9 @@ def _over_load(axis: Axes, diagnosis: Diagnosis, views: Sequence[View], unit: st
     load = -ratio * law_at(term, diagnosis.final.bench, -fine / ratio)
     found = means(rows, np.linspace(float(load.min()), float(load.max()), BINS + 1))
     factor, name = reading_unit(unit, max(deflections))
-    look = {"fmt": "o", "color": MEASURED, "markersize": 3.5, "linewidth": 1.0}
-    axis.plot(factor * load, factor * load, color=COMMAND, linestyle="--", linewidth=1.0, label="without it")
-    axis.plot(factor * load, factor * fine, color=SIMULATED, linewidth=1.8, label="fitted law")
-    axis.errorbar(factor * found.x, factor * found.before, 2.0 * factor * found.error, label="measured", **look)
+    looks.without(axis, factor * load, factor * load)
+    looks.law(axis, factor * load, factor * fine)
+    looks.points(axis, factor * found.x, factor * found.before, factor * found.error)
     style_axis(axis, f"table - motor position [{name}]", f"load, as deflection [{name}]")
 
 
@@ -190,11 +183,9 @@ def _over_speed(axis: Axes, diagnosis: Diagnosis, views: Sequence[View], unit: s
     edges = np.linspace(float(x.min()), float(x.max()), BINS + 1)
     found = {name: means(each, edges) for name, each in rows.items()}
     factor, name = reading_unit(unit, float(np.abs(found["measured"].before).max()))
-    for which, colour, width in (("before", COMMAND, 1.0), ("after", SIMULATED, 1.8)):
-        label = f"twin {which}"
-        axis.plot(to_read * found[which].x, factor * found[which].before, color=colour, linewidth=width, label=label)
-    one = found["measured"]
-    look = {"fmt": "o", "color": MEASURED, "markersize": 3.5, "linewidth": 1.0}
-    axis.errorbar(to_read * one.x, factor * one.before, 2.0 * factor * one.error, label="measured", **look)
+    looks.twin(axis, to_read * found["before"].x, factor * found["before"].before, "before")
+    looks.twin(axis, to_read * found["after"].x, factor * found["after"].before, "after")
+    measured = found["measured"]
+    looks.points(axis, to_read * measured.x, factor * measured.before, factor * measured.error)
     axis.axvline(0.0, color=DEVIATION, linewidth=0.8, linestyle=":")
     style_axis(axis, f"table - motor position [{name}]", f"speed of the table [{unit_of_speed}]")

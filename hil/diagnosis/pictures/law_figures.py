@@ -10,21 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.fitted_law import FINE, Means, Rows, bin_edges, means
 from hil.diagnosis.pictures.laws import Law
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
-from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
+from hil.figures.panels import COMMAND, DEVIATION, MEASURED
 from hil.quantities import digits, reading_unit
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
 
 BINS, BINS_OF_PERIOD = 40, 24
-MEASURED_LABEL, LAW_LABEL, BARE_LABEL = "measured, ± 2 σ", "fitted law", "without it"
 ORDERS = 1500  # of a spectrum
 SPECTRUM_ROWS = 20_000
-PASSED_HZ = 60.0  # by the mean of the disturbance
 
 
 def law_picture(law: Law) -> Drawer:
@@ -51,9 +50,7 @@ def _over_all(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Seque
     curve, at_points = law.value(term, diagnosis, fine), law.value(term, diagnosis, found.x)
     if np.any(law.bare(fine)):
         factor = reading_unit(unit, float(np.abs(curve).max())).factor
-        above.plot(
-            along * fine, factor * law.bare(fine), color=COMMAND, linestyle="--", linewidth=1.0, label=BARE_LABEL
-        )
+        looks.without(above, along * fine, factor * law.bare(fine))
     _law(above, along * fine, curve, along * found.x, at_points + found.after, found.error, unit, label)
     _left(below, along, found, unit)
     below.set_xlabel(f"{law.over.label} [{x_unit}]")
@@ -68,7 +65,7 @@ def _over_all(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Seque
 def _folded(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[Rows], period: float) -> Captioned:
     """Draw the law within one period beside the spectrum over the order."""
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
-    folded = [Rows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used) for one in rows]
+    folded = [Rows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used, one.resolution) for one in rows]
     found = means(folded, np.linspace(0.0, period, BINS_OF_PERIOD + 1))
     fine = np.linspace(0.0, period, FINE)
     figure = Figure(figsize=(WIDTH_IN, 6.2), layout="constrained")
@@ -82,7 +79,7 @@ def _folded(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequenc
     _left(below, along, found, unit)
     below.set_xlabel(f"{law.over.label} within one period [{x_unit}]")
     below.sharex(above)
-    _spectrum(beside, law, rows, views, period, unit)
+    _spectrum(beside, law, rows, period, unit)
     legend_outside(figure, (above, beside), 5)
     return Captioned(
         figure,
@@ -103,8 +100,8 @@ def _law(
     label: str,
 ) -> None:
     factor, name = reading_unit(unit, float(np.abs(curve).max()))
-    _points(axis, at, factor * points, factor * error, MEASURED_LABEL)
-    axis.plot(x, factor * curve, color=SIMULATED, linewidth=1.8, label=LAW_LABEL, zorder=3)
+    looks.points(axis, at, factor * points, factor * error)
+    looks.law(axis, x, factor * curve)
     style_axis(axis, f"{label}\n[{name}]")
 
 
@@ -114,18 +111,14 @@ def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
     axis.plot(
         along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label="left before"
     )
-    _points(axis, along * found.x, factor * found.after, factor * found.error, MEASURED_LABEL)
+    looks.points(axis, along * found.x, factor * found.after, factor * found.error)
     style_axis(axis, f"left\n[{name}]")
 
 
-def _points(axis: Axes, x: FloatArray, y: FloatArray, error: FloatArray, label: str) -> None:
-    axis.errorbar(x, y, 2.0 * error, fmt="o", color=MEASURED, markersize=3.5, linewidth=1.0, label=label, zorder=4)
-
-
-def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], views: Sequence[View], period: float, unit: str) -> None:
+def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], period: float, unit: str) -> None:
     """Draw the amplitude of what is left over the order, before and after."""
     order = law.over.per_unit / period
-    orders, before, after = spectra(law, rows, views, order)
+    orders, before, after = spectra(law, rows, order)
     factor, name = reading_unit(unit, float(before.max()))
     axis.fill_between(orders, 0.0, factor * before, color=COMMAND, alpha=0.45, linewidth=0.0, label="left before")
     axis.plot(orders, factor * after, color=MEASURED, linewidth=1.0, label="left after")
@@ -136,19 +129,17 @@ def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], views: Sequence[View],
     style_axis(axis, f"amplitude of what is left [{name}]", label)
 
 
-def spectra(
-    law: Law, rows: Sequence[Rows], views: Sequence[View], order: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def spectra(law: Law, rows: Sequence[Rows], order: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Orders (m,) and amplitudes (m,) of the residuals there before and after, by regression on the carrier."""
-    turns, carrier, before, after = [], [], [], []
-    for one, view in zip(rows, views, strict=True):
-        x = one.x / law.over.per_unit
-        slow = np.abs(np.gradient(x, view.run.period_s)) * order < PASSED_HZ
-        used = one.used & slow if np.count_nonzero(one.used & slow) > 1000 else one.used
-        turns.append(x[used])
-        carrier.append(one.carrier[used])
-        before.append(one.before[used])
-        after.append(one.after[used])
+    turns, carrier, before, after = (
+        [values[one.used] for values, one in zip(each, rows, strict=True)]
+        for each in (
+            [one.x / law.over.per_unit for one in rows],
+            [one.carrier for one in rows],
+            [one.before for one in rows],
+            [one.after for one in rows],
+        )
+    )
     angle, c = 2.0 * np.pi * np.concatenate(turns), np.concatenate(carrier)
     step = max(angle.size // SPECTRUM_ROWS, 1)
     span = max(float(np.ptp(one)) for one in turns)

@@ -14,12 +14,15 @@ from hil.diagnosis.pictures.view import View, label_of_channel, unit_of_channel
 from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Picture
 from hil.twin.parameter import Role
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
 
 Of = Callable[["Diagnosis", View], FloatArray]
+ZERO_ROWS = 2000  # that tell the zero of a residual
+SLOW_HZ, LEAST_ROWS = 20.0, 300  # a torque that the observer passes; of so many rows, else all count
 LEAST_SHARE = 0.1  # of the largest carrier: rows below say nothing of a law that is multiplied by it
 
 
@@ -38,8 +41,7 @@ class Axis:
 class Law:
     """How a law is drawn: over which quantity, in which channel, and by which factor it enters the residual there.
 
-    `value(term, diagnosis, x)` is the law (n,) in the unit `unit`. `bare` is what it is without the mechanism;
-    `centred`: it multiplies a position, which has no zero.
+    `value(term, diagnosis, x)` is the law (n,) in the unit `unit`. `bare` is what it is without the mechanism.
     """
 
     over: Axis
@@ -49,7 +51,6 @@ class Law:
     channel: Callable[[View], str] = lambda view: "motor"
     carrier: Callable[[Diagnosis, View], FloatArray] = lambda diagnosis, view: np.ones(view.run.motor.size)
     period: Callable[[Term], float | None] = lambda term: None
-    centred: bool = False
     bare: Callable[[FloatArray], FloatArray] = np.zeros_like
 
     def rows(self, diagnosis: Diagnosis, view: View) -> Rows:
@@ -58,9 +59,15 @@ class Law:
         carrier = self.carrier(diagnosis, view)
         used = view.torque.sliding & (np.abs(carrier) > LEAST_SHARE * float(np.abs(carrier).max()))
         used[: view.run.evaluated.start] = False
-        if self.centred:  # the zeros of both encoders are arbitrary
-            carrier, before = (values - float(np.mean(values[used])) for values in (carrier, before))
-        return Rows(self.over.of(diagnosis, view), carrier, before, after, used)
+        x, period = self.over.of(diagnosis, view), self.period(view.term)
+        slow = np.abs(np.gradient(x, view.run.period_s)) < SLOW_HZ * (period or np.inf)
+        if self.channel(view) == "motor" and np.count_nonzero(used & slow) >= LEAST_ROWS:
+            used &= slow  # the observer attenuates a quicker torque
+        if self.channel(view) == "table" and used.any():  # the zeros of both encoders are arbitrary
+            some = np.flatnonzero(used)[:: max(np.count_nonzero(used) // ZERO_ROWS, 1)]
+            law = carrier[some] * self.value(view.term, diagnosis, x[some])
+            before = before - float(np.mean((before - after)[some] - law))
+        return Rows(x, carrier, before, after, used)
 
     def labelled(self, diagnosis: Diagnosis, view: View) -> tuple[str, str]:
         """Label and SI unit of what is drawn."""
@@ -88,7 +95,8 @@ def _position(diagnosis: Diagnosis, view: View) -> FloatArray:
 
 ANGLE = Axis(_angle, "motor angle", lambda d: "rad", "per motor turn", 2.0 * np.pi)
 WAY = Axis(_position, "position", _length, "per metre", 1.0)
-SCALE = Axis(lambda d, view: view.run.table_m, "position", _length, "per metre", 1.0)
+# the place by the twin: finer than a count
+SCALE = Axis(lambda d, view: view.run.table_m - view.before["table"], "position", _length, "per metre", 1.0)
 TIME = Axis(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
 COMMAND = Axis(lambda d, view: view.run.torque_command, "torque command", _drive)
 
@@ -116,13 +124,13 @@ def _in_proportion(diagnosis: Diagnosis, view: View) -> FloatArray:
 
 def _reading_of_motor(diagnosis: Diagnosis, view: View) -> FloatArray:
     """A motor that reads too much makes the table read too little; without a table, its error is an acceleration."""
-    if "table" in view.before:
+    if view.has_table:
         return np.full(view.run.motor.size, -diagnosis.given_bench.axis.ratio_m_rad)
     return -inertia(diagnosis.final.bench) * view.torque.velocity**2
 
 
 def _table(view: View) -> str:
-    return "table" if "table" in view.before else "motor"
+    return "table" if view.has_table else "motor"
 
 
 def _torque(view: View) -> str:
@@ -151,62 +159,75 @@ def _metres(diagnosis: Diagnosis) -> float:
     return float(diagnosis.given_bench.axis.ratio_m_rad)
 
 
-COGGING = Law(ANGLE, lambda term, d, x: _at(term, d, angle_rad=x), period=_per_order)
-RIPPLE = Law(
-    ANGLE,
-    lambda term, d, x: _at(term, d, 1.0, angle_rad=x) - 1.0,
-    "torque per ampere, change",
-    "1",
-    carrier=lambda d, view: view.run.torque,
-    period=_per_order,
-)
-LEAD_OVER_TURN = Law(
-    ANGLE, lambda term, d, x: _metres(d) * _at(term, d, angle_rad=x), "lead error", channel=_table, period=_per_order
-)
-LEAD_OVER_TRAVEL = Law(WAY, lambda term, d, x: _metres(d) * _at(term, d, table_m=x), "lead error", channel=_table)
-GROWTH = Law(
-    TIME,
-    lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0)),
-    "growth of the screw",
-    "m/m",
-    channel=_table,
-    carrier=_position,
-    centred=True,
-)
-MOTOR_READING = Law(
-    ANGLE,
-    lambda term, d, x: _at(term, d, angle_rad=x),
-    "error of the motor encoder",
-    "rad",
-    channel=_table,
-    carrier=_reading_of_motor,
-    period=_per_order,
-)
-LOAD_READING = Law(WAY, lambda term, d, x: _at(term, d, table_m=x), "error of the load encoder", channel=_table)
-SCALE_READING = Law(
-    SCALE, lambda term, d, x: _at(term, d, table_m=x), "error of the linear encoder", channel=_table, period=_period
-)
-FRICTION_OVER_TRAVEL = Law(
-    WAY,
-    lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
-    "Coulomb friction, change",
-    "1",
-    carrier=_coulomb,
-    period=_period,
-)
-FRICTION_OVER_TIME = Law(
-    TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction
-)
-FORCE_OVER_TRAVEL = Law(WAY, lambda term, d, x: _at(term, d, table_m=x), "force on the table", "force", carrier=_ratio)
-FORCE_OVER_TIME = Law(
-    TIME, lambda term, d, x: _at(term, d, time_s=x), "force on the table", "force", carrier=_ratio, period=_per_line
-)
-STIFFNESS = Law(
-    WAY,
-    lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
-    "stiffness of the screw, change",
-    "1",
-    channel=_table,
-    carrier=_in_proportion,
-)
-CHARACTERISTIC = Law(COMMAND, lambda term, d, x: _at(term, d, x), "torque", channel=_torque, bare=lambda x: x)
+LAWS: dict[Picture, Law] = {
+    Picture.COGGING: Law(ANGLE, lambda term, d, x: _at(term, d, angle_rad=x), period=_per_order),
+    Picture.RIPPLE: Law(
+        ANGLE,
+        lambda term, d, x: _at(term, d, 1.0, angle_rad=x) - 1.0,
+        "torque per ampere, change",
+        "1",
+        carrier=lambda d, view: view.run.torque,
+        period=_per_order,
+    ),
+    Picture.LEAD_OVER_TURN: Law(
+        ANGLE,
+        lambda term, d, x: _metres(d) * _at(term, d, angle_rad=x),
+        "lead error",
+        channel=_table,
+        period=_per_order,
+    ),
+    Picture.LEAD_OVER_TRAVEL: Law(
+        WAY, lambda term, d, x: _metres(d) * _at(term, d, table_m=x), "lead error", channel=_table
+    ),
+    Picture.GROWTH: Law(
+        TIME,
+        lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0)),
+        "growth of the screw",
+        "m/m",
+        channel=_table,
+        carrier=_position,
+    ),
+    Picture.MOTOR_READING: Law(
+        ANGLE,
+        lambda term, d, x: _at(term, d, angle_rad=x),
+        "error of the motor encoder",
+        "rad",
+        channel=_table,
+        carrier=_reading_of_motor,
+        period=_per_order,
+    ),
+    Picture.LOAD_READING: Law(
+        WAY, lambda term, d, x: _at(term, d, table_m=x), "error of the load encoder", channel=_table
+    ),
+    Picture.SCALE_READING: Law(
+        SCALE, lambda term, d, x: _at(term, d, table_m=x), "error of the linear encoder", channel=_table, period=_period
+    ),
+    Picture.FRICTION_OVER_TRAVEL: Law(
+        WAY,
+        lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
+        "Coulomb friction, change",
+        "1",
+        carrier=_coulomb,
+        period=_period,
+    ),
+    Picture.FRICTION_OVER_TIME: Law(
+        TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction
+    ),
+    Picture.FORCE_OVER_TRAVEL: Law(
+        WAY, lambda term, d, x: _at(term, d, table_m=x), "force on the table", "force", carrier=_ratio
+    ),
+    Picture.FORCE_OVER_TIME: Law(
+        TIME, lambda term, d, x: _at(term, d, time_s=x), "force on the table", "force", carrier=_ratio, period=_per_line
+    ),
+    Picture.STIFFNESS: Law(
+        WAY,
+        lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
+        "stiffness of the screw, change",
+        "1",
+        channel=_table,
+        carrier=_in_proportion,
+    ),
+    Picture.CHARACTERISTIC: Law(
+        COMMAND, lambda term, d, x: _at(term, d, x), "torque", channel=_torque, bare=lambda x: x
+    ),
+}

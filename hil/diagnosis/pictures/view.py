@@ -52,6 +52,11 @@ class View:
         return self.before[channel], self.after[channel]
 
     @property
+    def has_table(self) -> bool:
+        """True if a second encoder is recorded."""
+        return bool(self.run.table_m.size)
+
+    @property
     def shows_delay(self) -> str:
         """Channel that shows a delay best: the difference of two encoders needs no model of the axis."""
         size = self._sizes()

@@ -73,7 +73,16 @@ def legend_outside(figure: Figure, axes: Iterable[Axes], columns: int = 4) -> No
     """Put one legend above all axes of a figure, each label once."""
     labelled = [axis.get_legend_handles_labels() for axis in axes]
     known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
-    figure.legend(known.values(), known.keys(), loc="outside upper center", ncols=columns, frameon=False)
+    figure.legend(
+        known.values(),
+        known.keys(),
+        loc="outside upper center",
+        ncols=columns,
+        frameon=False,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        handlelength=1.6,
+    )
 
 
 def save(figure: Figure, path: Path) -> Path:

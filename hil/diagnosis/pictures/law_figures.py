@@ -13,6 +13,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.fitted_law import FINE, Means, Rows, bin_edges, means
 from hil.diagnosis.pictures.laws import Law
+from hil.diagnosis.pictures.over_time import residual_over_time
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED
@@ -30,9 +31,11 @@ def law_picture(law: Law) -> Drawer:
     """Make the picture of a law: folded on its period beside the spectrum, or over the whole quantity."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
+        if any(law.channel(view) not in view.before for view in views):
+            return residual_over_time(diagnosis, views)
         period = law.period(views[0].term)
         rows = [law.rows(diagnosis, view) for view in views]
-        if period is None or not any(one.used.any() for one in rows):
+        if period is None:
             return _over_all(law, diagnosis, views, rows)
         return _folded(law, diagnosis, views, rows, period)
 

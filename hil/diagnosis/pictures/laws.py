@@ -130,6 +130,10 @@ def _reading_of_motor(diagnosis: Diagnosis, view: View) -> FloatArray:
 
 
 def _table(view: View) -> str:
+    return "table"
+
+
+def _table_or_motor(view: View) -> str:
     return "table" if view.has_table else "motor"
 
 
@@ -192,7 +196,7 @@ LAWS: dict[Picture, Law] = {
         lambda term, d, x: _at(term, d, angle_rad=x),
         "error of the motor encoder",
         "rad",
-        channel=_table,
+        channel=_table_or_motor,
         carrier=_reading_of_motor,
         period=_per_order,
     ),

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 
 from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
 from hil.diagnosis import stages
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
@@ -44,13 +45,13 @@ def stronger(term: Term, times: float) -> Term:
     return replace(term, values=tuple(values))
 
 
-def diagnosis_of(effect: str, times: float = 3.0, believed: float = 1.0) -> Diagnosis:
+def diagnosis_of(effect: str, times: float = 3.0, believed: float = 1.0, owner: Bench = OWNER) -> Diagnosis:
     """A diagnosis of an effect of some times the strength that an engineer would call a defect.
 
     It is right, or has another strength: `believed` is the found one over the true one.
     """
-    run = take(recorded(OWNER), OWNER)
-    values = list(BY_ID[effect].typical_values(axis_facts(OWNER, [run])))
+    run = take(recorded(owner), owner)
+    values = list(BY_ID[effect].typical_values(axis_facts(owner, [run])))
     as_it_is = (
         "presliding_hysteresis",
         "structural_mode",
@@ -63,9 +64,9 @@ def diagnosis_of(effect: str, times: float = 3.0, believed: float = 1.0) -> Diag
     for name, value in WITHIN_THE_RECORDING.get(effect, {}).items():
         values[BY_ID[effect].names.index(name)] = value
     term = Term(effect, 0, tuple(values))
-    runs = [take(recorded(OWNER, term), OWNER)]
-    data = dataset(runs, OWNER)
-    plain, right = evaluated(Hypothesis(OWNER), data), evaluated(Hypothesis(OWNER, (stronger(term, believed),)), data)
+    runs = [take(recorded(owner, term), owner)]
+    data = dataset(runs, owner)
+    plain, right = evaluated(Hypothesis(owner), data), evaluated(Hypothesis(owner, (stronger(term, believed),)), data)
     proof = CrossValidation(right, (), ())
     tested = stages.Tested(searched(plain, plain, right), proof, Refit(plain, ""))
     verdict = Verdict.MISSING_PHYSICS
@@ -81,7 +82,7 @@ def diagnosis_of(effect: str, times: float = 3.0, believed: float = 1.0) -> Diag
         unexplained=Unexplained(share=0.0, description=""),
         runtime_s=0.0,
     )
-    return Diagnosis(stages.Reported(judged, result, OWNER, None))
+    return Diagnosis(stages.Reported(judged, result, owner, None))
 
 
 def test_only_evaluated_rows_are_enlarged() -> None:
@@ -172,6 +173,37 @@ def test_the_drawn_law_is_what_the_twin_left_before(effect: str) -> None:
     expected = carrier * (law.value(term, diagnosis, x) - law.bare(x))
     assert np.corrcoef(before, expected)[0, 1] > 0.7
     assert 0.6 < float(before @ expected / (expected @ expected)) < 1.4
+
+
+@pytest.mark.parametrize("effect", ["scale_interpolation_error", "periodic_lead_error", "backlash", "structural_mode"])
+def test_a_picture_needs_no_second_encoder(effect: str) -> None:
+    blind = OWNER.model_copy(update={"encoders": OWNER.encoders.model_copy(update={"table": None})})
+    diagnosis = diagnosis_of(effect, owner=blind)
+    figure, _ = finding_figure(diagnosis, diagnosis.final.terms[0])
+    assert figure.axes[-1].get_xlabel() in ("time [s]", "frequency [Hz]")
+
+
+def test_a_cogging_of_many_periods_is_folded_on_one_beside_its_line() -> None:
+    diagnosis = diagnosis_of("cogging_torque")
+    above, beside, _ = finding_figure(diagnosis, diagnosis.final.terms[0]).figure.axes
+    (curve,) = (line.get_xydata() for line in above.lines if line.get_label() == "fitted law")
+    assert len(curve) >= 400
+    assert np.ptp(curve[:, 0]) == pytest.approx(30.0)  # degrees, of 12 periods per turn
+    (after,) = (line for line in beside.lines if line.get_label() == "left after")
+    before = max(float(path.vertices[:, 1].max()) for one in beside.collections for path in one.get_paths())
+    assert float(np.max(after.get_ydata())) < 0.05 * before
+
+
+def test_no_legend_lies_over_data() -> None:
+    for effect in ("cogging_torque", "stribeck_friction", "backlash", "transport_delay", "structural_mode"):
+        diagnosis = diagnosis_of(effect)
+        figure = finding_figure(diagnosis, diagnosis.final.terms[0]).figure
+        figure.draw_without_rendering()
+        assert all(axis.get_legend() is None for axis in figure.axes)
+        legend = figure.legends[0].get_window_extent()
+        assert not any(legend.overlaps(axis.get_window_extent()) for axis in figure.axes)
+        assert legend.x0 >= 0.0
+        assert legend.x1 <= figure.bbox.x1
 
 
 def test_the_location_shows_shares_that_add_up_and_densities_with_units() -> None:

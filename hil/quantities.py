@@ -114,6 +114,15 @@ def digits(value: float, significant: int = 3) -> str:
     return f"{value:.{significant - 1}e}"
 
 
+def with_error(value: float, error: float) -> tuple[str, str]:
+    """Value and standard error as texts: the error with two digits, the value to the last of them."""
+    known = math.isfinite(error) and error > 0.0
+    if not known or not (value == 0.0 or 1e-3 <= abs(value) < 1e6) or error < 1e-6 * abs(value):
+        return digits(value, 4), digits(error, 2)
+    decimals = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
+
+
 def quantity(value: float, unit: str) -> str:
     """Value of an SI unit as text with three digits, such as "24.7 µm"."""
     factor, shown = reading_unit(unit, value)

@@ -6,7 +6,7 @@ from hil.diagnosis.result import Result
 from hil.diagnosis.wording import spoken, title
 from hil.quantities import percent, quantity
 from hil.report.console import out, table
-from hil.report.diagnosis_report import torque_line
+from hil.report.fit_section import torque_line
 
 
 def print_diagnosis(result: Result, report: Path) -> None:

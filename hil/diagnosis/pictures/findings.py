@@ -16,7 +16,7 @@ from hil.diagnosis.pictures.windows import force_over_time
 from hil.diagnosis.turning import labelled
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Picture
+from hil.twin.picture import Picture
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis

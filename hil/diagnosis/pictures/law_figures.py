@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
-from hil.diagnosis.pictures.fitted_law import FINE, Means, Rows, bin_edges, means
-from hil.diagnosis.pictures.laws import Law
+from hil.diagnosis.pictures.fitted_law import FINE, LawRows, Means, bin_edges, means
+from hil.diagnosis.pictures.laws import DrawnLaw
 from hil.diagnosis.pictures.over_time import residual_over_time
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
@@ -27,7 +27,7 @@ ORDERS = 1500  # of a spectrum
 SPECTRUM_ROWS = 20_000
 
 
-def law_picture(law: Law) -> Drawer:
+def law_picture(law: DrawnLaw) -> Drawer:
     """Make the picture of a law: folded on its period beside the spectrum, or over the whole quantity."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
@@ -42,7 +42,7 @@ def law_picture(law: Law) -> Drawer:
     return picture
 
 
-def _over_all(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[Rows]) -> Captioned:
+def _over_all(law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[LawRows]) -> Captioned:
     """Draw the law over the whole quantity; below, what is left before and after."""
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
     edges = bin_edges(rows, BINS)
@@ -65,10 +65,14 @@ def _over_all(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Seque
     )
 
 
-def _folded(law: Law, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[Rows], period: float) -> Captioned:
+def _folded(
+    law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[LawRows], period: float
+) -> Captioned:
     """Draw the law within one period beside the spectrum over the order."""
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
-    folded = [Rows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used, one.resolution) for one in rows]
+    folded = [
+        LawRows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used, one.resolution) for one in rows
+    ]
     found = means(folded, np.linspace(0.0, period, BINS_OF_PERIOD + 1))
     fine = np.linspace(0.0, period, FINE)
     figure = Figure(figsize=(WIDTH_IN, 6.2), layout="constrained")
@@ -118,7 +122,7 @@ def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
     style_axis(axis, f"left\n[{name}]")
 
 
-def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], period: float, unit: str) -> None:
+def _spectrum(axis: Axes, law: DrawnLaw, rows: Sequence[LawRows], period: float, unit: str) -> None:
     """Draw the amplitude of what is left over the order, before and after."""
     order = law.over.per_unit / period
     orders, before, after = spectra(law, rows, order)
@@ -132,7 +136,7 @@ def _spectrum(axis: Axes, law: Law, rows: Sequence[Rows], period: float, unit: s
     style_axis(axis, f"amplitude of what is left [{name}]", label)
 
 
-def spectra(law: Law, rows: Sequence[Rows], order: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def spectra(law: DrawnLaw, rows: Sequence[LawRows], order: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Orders (m,) and amplitudes (m,) of the residuals there before and after, by regression on the carrier."""
     turns, carrier, before, after = (
         [values[one.used] for values, one in zip(each, rows, strict=True)]

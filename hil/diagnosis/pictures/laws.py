@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.pictures.fitted_law import Rows, law_at
+from hil.diagnosis.pictures.fitted_law import LawRows, law_at
 from hil.diagnosis.pictures.view import View, label_of_channel, unit_of_channel
 from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Picture
 from hil.twin.parameter import Role
+from hil.twin.picture import Picture
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
@@ -27,7 +27,7 @@ LEAST_SHARE = 0.1  # of the largest carrier: rows below say nothing of a law tha
 
 
 @dataclass(frozen=True)
-class Axis:
+class Abscissa:
     """A quantity (n,) of a run in SI units, its label, and that of its inverse: how often something repeats."""
 
     of: Of
@@ -38,13 +38,13 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Law:
+class DrawnLaw:
     """How a law is drawn: over which quantity, in which channel, and by which factor it enters the residual there.
 
     `value(term, diagnosis, x)` is the law (n,) in the unit `unit`. `bare` is what it is without the mechanism.
     """
 
-    over: Axis
+    over: Abscissa
     value: Callable[[Term, Diagnosis, FloatArray], FloatArray]
     label: str = ""  # without: that of the channel
     unit: str = ""  # without: that of the channel
@@ -53,7 +53,7 @@ class Law:
     period: Callable[[Term], float | None] = lambda term: None
     bare: Callable[[FloatArray], FloatArray] = np.zeros_like
 
-    def rows(self, diagnosis: Diagnosis, view: View) -> Rows:
+    def rows(self, diagnosis: Diagnosis, view: View) -> LawRows:
         """The rows of a run in which the axis slides and the law enters."""
         before, after = view.residuals(self.channel(view))
         carrier = self.carrier(diagnosis, view)
@@ -67,7 +67,7 @@ class Law:
             some = np.flatnonzero(used)[:: max(np.count_nonzero(used) // ZERO_ROWS, 1)]
             law = carrier[some] * self.value(view.term, diagnosis, x[some])
             before = before - float(np.mean((before - after)[some] - law))
-        return Rows(x, carrier, before, after, used)
+        return LawRows(x, carrier, before, after, used)
 
     def labelled(self, diagnosis: Diagnosis, view: View) -> tuple[str, str]:
         """Label and SI unit of what is drawn."""
@@ -93,12 +93,12 @@ def _position(diagnosis: Diagnosis, view: View) -> FloatArray:
     return diagnosis.given_bench.axis.ratio_m_rad * view.run.motor
 
 
-ANGLE = Axis(_angle, "motor angle", lambda d: "rad", "per motor turn", 2.0 * np.pi)
-WAY = Axis(_position, "position", _length, "per metre", 1.0)
+ANGLE = Abscissa(_angle, "motor angle", lambda d: "rad", "per motor turn", 2.0 * np.pi)
+WAY = Abscissa(_position, "position", _length, "per metre", 1.0)
 # the place by the twin: finer than a count
-SCALE = Axis(lambda d, view: view.run.table_m - view.before["table"], "position", _length, "per metre", 1.0)
-TIME = Axis(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
-COMMAND = Axis(lambda d, view: view.run.torque_command, "torque command", _drive)
+SCALE = Abscissa(lambda d, view: view.run.table_m - view.before["table"], "position", _length, "per metre", 1.0)
+TIME = Abscissa(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
+COMMAND = Abscissa(lambda d, view: view.run.torque_command, "torque command", _drive)
 
 
 def _friction(diagnosis: Diagnosis, view: View) -> FloatArray:
@@ -163,9 +163,9 @@ def _metres(diagnosis: Diagnosis) -> float:
     return float(diagnosis.given_bench.axis.ratio_m_rad)
 
 
-LAWS: dict[Picture, Law] = {
-    Picture.COGGING: Law(ANGLE, lambda term, d, x: _at(term, d, angle_rad=x), period=_per_order),
-    Picture.RIPPLE: Law(
+LAWS: dict[Picture, DrawnLaw] = {
+    Picture.COGGING: DrawnLaw(ANGLE, lambda term, d, x: _at(term, d, angle_rad=x), period=_per_order),
+    Picture.RIPPLE: DrawnLaw(
         ANGLE,
         lambda term, d, x: _at(term, d, 1.0, angle_rad=x) - 1.0,
         "torque per ampere, change",
@@ -173,17 +173,17 @@ LAWS: dict[Picture, Law] = {
         carrier=lambda d, view: view.run.torque,
         period=_per_order,
     ),
-    Picture.LEAD_OVER_TURN: Law(
+    Picture.LEAD_OVER_TURN: DrawnLaw(
         ANGLE,
         lambda term, d, x: _metres(d) * _at(term, d, angle_rad=x),
         "lead error",
         channel=_table,
         period=_per_order,
     ),
-    Picture.LEAD_OVER_TRAVEL: Law(
+    Picture.LEAD_OVER_TRAVEL: DrawnLaw(
         WAY, lambda term, d, x: _metres(d) * _at(term, d, table_m=x), "lead error", channel=_table
     ),
-    Picture.GROWTH: Law(
+    Picture.GROWTH: DrawnLaw(
         TIME,
         lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0)),
         "growth of the screw",
@@ -191,7 +191,7 @@ LAWS: dict[Picture, Law] = {
         channel=_table,
         carrier=_position,
     ),
-    Picture.MOTOR_READING: Law(
+    Picture.MOTOR_READING: DrawnLaw(
         ANGLE,
         lambda term, d, x: _at(term, d, angle_rad=x),
         "error of the motor encoder",
@@ -200,13 +200,13 @@ LAWS: dict[Picture, Law] = {
         carrier=_reading_of_motor,
         period=_per_order,
     ),
-    Picture.LOAD_READING: Law(
+    Picture.LOAD_READING: DrawnLaw(
         WAY, lambda term, d, x: _at(term, d, table_m=x), "error of the load encoder", channel=_table
     ),
-    Picture.SCALE_READING: Law(
+    Picture.SCALE_READING: DrawnLaw(
         SCALE, lambda term, d, x: _at(term, d, table_m=x), "error of the linear encoder", channel=_table, period=_period
     ),
-    Picture.FRICTION_OVER_TRAVEL: Law(
+    Picture.FRICTION_OVER_TRAVEL: DrawnLaw(
         WAY,
         lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
         "Coulomb friction, change",
@@ -214,16 +214,16 @@ LAWS: dict[Picture, Law] = {
         carrier=_coulomb,
         period=_period,
     ),
-    Picture.FRICTION_OVER_TIME: Law(
+    Picture.FRICTION_OVER_TIME: DrawnLaw(
         TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction
     ),
-    Picture.FORCE_OVER_TRAVEL: Law(
+    Picture.FORCE_OVER_TRAVEL: DrawnLaw(
         WAY, lambda term, d, x: _at(term, d, table_m=x), "force on the table", "force", carrier=_ratio
     ),
-    Picture.FORCE_OVER_TIME: Law(
+    Picture.FORCE_OVER_TIME: DrawnLaw(
         TIME, lambda term, d, x: _at(term, d, time_s=x), "force on the table", "force", carrier=_ratio, period=_per_line
     ),
-    Picture.STIFFNESS: Law(
+    Picture.STIFFNESS: DrawnLaw(
         WAY,
         lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
         "stiffness of the screw, change",
@@ -231,7 +231,7 @@ LAWS: dict[Picture, Law] = {
         channel=_table,
         carrier=_in_proportion,
     ),
-    Picture.CHARACTERISTIC: Law(
+    Picture.CHARACTERISTIC: DrawnLaw(
         COMMAND, lambda term, d, x: _at(term, d, x), "torque", channel=_torque, bare=lambda x: x
     ),
 }

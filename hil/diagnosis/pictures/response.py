@@ -27,7 +27,7 @@ LEAST_COHERENCE = 0.2  # of a point: below, its error is its value
 BEYOND = 4.0  # highest frequency drawn, over that of the mode
 
 
-class Response(NamedTuple):
+class ResponseEstimate(NamedTuple):
     """Frequencies (m,) [Hz], gain (m,) of the axis, coherence (m,), and standard error (m,) of the gain."""
 
     frequency_hz: FloatArray
@@ -65,7 +65,7 @@ def frequency_response(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned
     )
 
 
-def response(diagnosis: Diagnosis, views: Sequence[View], mode_hz: float, which: str) -> Response:
+def response(diagnosis: Diagnosis, views: Sequence[View], mode_hz: float, which: str) -> ResponseEstimate:
     """Estimate the response (H1, Welch) of the measurement, or of the twin before or after, on the measured input."""
     period_s = views[0].run.period_s
     segment = round(SEGMENT_CYCLES / mode_hz / period_s)
@@ -92,7 +92,7 @@ def response(diagnosis: Diagnosis, views: Sequence[View], mode_hz: float, which:
     error = np.sqrt(beside / of_given / max(2.0 * segments * 11.0 / 18.0, 1.0))
     rows = slice(1, max(int(np.searchsorted(frequency_hz, BEYOND * mode_hz)), 4))
     gain = np.abs(crossed) / of_given
-    return Response(frequency_hz[rows], gain[rows], coherence[rows], error[rows])
+    return ResponseEstimate(frequency_hz[rows], gain[rows], coherence[rows], error[rows])
 
 
 def _signals(diagnosis: Diagnosis, view: View, which: str) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 _LEAST = 1e-3  # share of the travel beyond the edge, below which a stop is not reached

@@ -5,8 +5,9 @@ A guide out of line, a cover or a cable that is dragged along, or a nut that wea
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 # Shortest flank [m]: an axis needs several internal steps for it, so that the twin is continuous in the edges.

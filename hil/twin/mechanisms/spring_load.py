@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.mechanisms.constant_load import MECHANISM as LOAD
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 

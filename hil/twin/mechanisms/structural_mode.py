@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Picture, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.frequency import modal_damping

@@ -26,7 +26,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.terms import Term
 from hil.twin.library import BY_ID, LIBRARY
-from hil.twin.mechanism import Picture
+from hil.twin.picture import Picture
 
 OWNER = bench()
 WITHIN_THE_RECORDING = {  # of 2.4 s over 60 mm, and 5 N m at most

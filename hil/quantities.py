@@ -59,6 +59,7 @@ _READ_IN: dict[str, tuple[tuple[float, float, str], ...]] = {
     "N m": ((0.1, 1.0, "N m"), (0.0, 1e3, "mN m")),
     "N/m": ((1e5, 1e-6, "N/µm"), (0.0, 1.0, "N/m")),
     "1": ((0.0, 100.0, "%"),),
+    "m/m": ((0.0, 1e6, "µm/m"),),
     "1/rev": ((0.0, 1.0, ""),),  # the sentence says what is counted
 }
 
@@ -116,6 +117,15 @@ def digits(value: float, significant: int = 3) -> str:
         decimals = max(significant - 1 - math.floor(math.log10(abs(value) or 1.0)), 0)
         return f"{value:.{decimals}f}"
     return f"{value:.{significant - 1}e}"
+
+
+def with_error(value: float, error: float) -> tuple[str, str]:
+    """Value and standard error as texts: the error with two digits, the value to the last of them."""
+    known = math.isfinite(error) and error > 0.0
+    if not known or not (value == 0.0 or 1e-3 <= abs(value) < 1e6) or error < 1e-6 * abs(value):
+        return digits(value, 4), digits(error, 2)
+    decimals = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
 def quantity(value: float, unit: str) -> str:

@@ -30,7 +30,7 @@ from hil.diagnosis.verdict.ledgers import ledgers
 from hil.diagnosis.verdict.refit import torque_left
 from hil.diagnosis.verdict.testability import not_testable
 from hil.diagnosis.verdict.unnamed import UnnamedTerm, with_maps
-from hil.diagnosis.wording import channel_names, title, where_in_short
+from hil.diagnosis.wording import channel_names, spoken, title, where_in_short
 from hil.identification.estimator import Fit
 from hil.identification.noise_floor import FLOOR
 from hil.quantities import digits
@@ -162,14 +162,9 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
             for name, ratio in ratios.items():
                 worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
-    unit = final.bench.axis.drive_unit
-    structure = "; ".join(one.in_words(unit) for one in judged.structure[:2])
     if not above:
-        more = f" Structure is left: {structure}." if structure else ""
-        return Unexplained(share=share, description=AT_FLOOR + more)
-    text = ", ".join(f"{name} at {digits(above[name])} × noise rms" for name in sorted(above, key=lambda n: -above[n]))
+        return Unexplained(share=share, description=AT_FLOOR)
+    text = ", ".join(f"{spoken(name)} {digits(above[name])} times" for name in sorted(above, key=lambda n: -above[n]))
     if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:
         text += f"; {where_in_short(location, final.bench.axis.turns)}"
-    if structure:
-        text += f". Structure is left: {structure}"
-    return Unexplained(share=share, description=f"Residuals above the noise, block by block: {text}.")
+    return Unexplained(share=share, description=f"Residuals above the noise (rms): {text}.")

@@ -5,31 +5,17 @@ from collections.abc import Sequence
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import AT_FLOOR, AxisChange, Correction, Finding, FitFigures, Result, Verdict
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import spoken, title
+from hil.identification.noise_floor import FLOOR
 from hil.quantities import percent, quantity
+
+MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effect; the table has all
 
 
 def statement(result: Result) -> str:
     """The verdict as one sentence."""
     if result.verdict is Verdict.MISSING_PHYSICS:
-        named = _sentences(result.missing)
-        name, entry = max(result.fit.items(), key=lambda item: _improvement(item[1].train))
-        found = entry.validate_ or entry.train
-        before, after, noise = (
-            quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
-        )
-        change = (
-            f"decreases from {before} to {after}"
-            if found.after_rms < found.best_before_rms
-            else (f"does not decrease: {after} instead of {before}")
-        )
-        surest = max(one.confidence for one in result.missing)
-        doubt = "" if surest >= CRITERIA.likely else f", doubtful by its confidence ({percent(surest)})"
-        where = "held-out" if entry.validate_ else "these"
-        return (
-            f"Missing physics{doubt}: {named} With all of it the residual of {name} on {where} recordings {change} "
-            f"rms; the noise floor is {noise}.{_left(result)}"
-        )
+        return f"{_found('Missing physics', result.missing)} {_residual(result)}{_left(result)}"
     if result.verdict is Verdict.PARAMETER_ERROR:
         worst = sorted(result.parameter_corrections.items(), key=lambda item: -_growth(item[1]))
         changes = ", ".join(_changed(name, one) for name, one in worst[:3])
@@ -41,15 +27,55 @@ def statement(result: Result) -> str:
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget:
-        return f"The time budget ended before a mechanism was found: {result.unexplained.description}"
+        return f"The time budget ended before a mechanism was found: {_unexplained(result)}"
     if result.partial:
-        part = _sentences(result.partial)
         share = percent(1.0 - result.unexplained.share)
         return (
-            f"No mechanism of the library explains the whole mismatch. Found, for {share} of its energy above the "
-            f"noise: {part} {result.unexplained.description}"
+            "No mechanism of the library explains the whole mismatch. "
+            f"{_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
         )
-    return f"The mismatch is not explained by any mechanism of the library: {result.unexplained.description}"
+    return f"The mismatch is not explained by any mechanism of the library: {_unexplained(result)}"
+
+
+def explained(result: Result) -> bool:
+    """True if the answer is sure and nothing above the noise, and no structure, is left."""
+    sure = not result.missing or max(one.confidence for one in result.missing) >= CRITERIA.likely
+    whole = result.verdict is not Verdict.UNEXPLAINED and not result.time_budget and not result.partial
+    return whole and sure and not result.structure and result.unexplained.description == AT_FLOOR
+
+
+def _found(before: str, found: Sequence[Finding]) -> str:
+    """What is there, in one sentence each; then what may be there, in one clause."""
+    likely = [one for one in found if one.confidence >= CRITERIA.likely]
+    others = [one for one in found if one not in likely and one.confidence >= MENTIONED]
+    perhaps = listed([f"{title(one.effect)} ({percent(one.confidence)})" for one in others])
+    if not likely:
+        likely = [max(found, key=lambda one: one.confidence)]
+        perhaps = listed([f"{title(one.effect)} ({percent(one.confidence)})" for one in others if one not in likely])
+        before = f"{before}, doubtful by its confidence ({percent(likely[0].confidence)})"
+    told = f"{before}: {' '.join(one.sentence for one in likely)}"
+    return f"{told} Perhaps also {perhaps}." if perhaps else told
+
+
+def listed(texts: Sequence[str]) -> str:
+    """Join texts as a list of a sentence: "a, b and c"."""
+    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
+
+
+def _residual(result: Result) -> str:
+    """Residual before and after of the channel that improves most."""
+    name, entry = max(result.fit.items(), key=lambda item: _improvement(item[1].train))
+    found = entry.validate_ or entry.train
+    before, after, noise = (
+        quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
+    )
+    where = "held-out" if entry.validate_ else "these"
+    what = f"With it the residual of the {spoken(name)} on {where} recordings"
+    if found.after_rms >= found.best_before_rms:
+        return f"{what} does not fall: {after} instead of {before} rms."
+    if found.after_rms**2 <= FLOOR * found.noise_floor_rms**2:
+        return f"{what} falls from {before} rms to its noise."
+    return f"{what} falls from {before} to {after} rms; its noise is {noise}."
 
 
 def _of_axis(change: AxisChange, result: Result) -> str:
@@ -87,17 +113,18 @@ def _changed(name: str, one: Correction) -> str:
 
 
 def _left(result: Result) -> str:
-    """Return the residuals above the noise floor as a sentence; empty if there are none."""
+    """What is left above the noise as a sentence, and what it depends on; empty if nothing is."""
     told = result.unexplained.description
-    return "" if told == AT_FLOOR else f" Not explained: {told[0].lower()}{told[1:]}"
+    above = "" if told == AT_FLOOR else f" Not explained: {told[:1].lower()}{told[1:]}"
+    return f"{above}{_depends(result)}"
 
 
-def _sentences(found: Sequence[Finding]) -> str:
-    """The sentences of findings that are more likely there than not, and the names of the others."""
-    likely = [one for one in found if one.confidence >= CRITERIA.likely] or found
-    doubtful = ", ".join(f"{title(one.effect)} ({percent(one.confidence)})" for one in found if one not in likely)
-    sentences = " ".join(one.sentence for one in likely)
-    return f"{sentences} Doubtful, by their confidence: {doubtful}." if doubtful else sentences
+def _unexplained(result: Result) -> str:
+    return f"{result.unexplained.description}{_depends(result)}"
+
+
+def _depends(result: Result) -> str:
+    return f" Structure is left: {result.structure[0].text}." if result.structure else ""
 
 
 def _improvement(found: FitFigures) -> float:

@@ -85,7 +85,7 @@ class Dependence:
         else:
             what = f"the second encoder reads {quantity(abs(value), question.length)} {more} than the twin"
         if question.name == OFFSET:
-            return f"{what} throughout (by chance {found.p:.1g})"
+            return f"{what} throughout ({by_chance(found.p)})"
         moving = ""
         if question.by_direction:
             moving = " moving up" if low >= question.by_direction else " moving down"
@@ -93,8 +93,13 @@ class Dependence:
         factor, unit = reading_unit(question.unit, max(abs(low), abs(high)))
         return (
             f"{what} at a {question.name} of {digits(factor * low)} to {digits(factor * high)} {unit}{moving} "
-            f"(by chance {self.found.p:.1g})"
+            f"({by_chance(self.found.p)})"
         )
+
+
+def by_chance(p: float) -> str:
+    """Probability of a structure by chance, in words."""
+    return f"by chance {p:.1g}" if p > 1e-12 else "by chance less than 1e-12"
 
 
 def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:

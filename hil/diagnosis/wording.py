@@ -8,7 +8,7 @@ from hil.diagnosis.result import Location
 from hil.diagnosis.turning import of_load, speed_unit
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
-from hil.quantities import digits, quantity
+from hil.quantities import digits, quantity, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
@@ -24,6 +24,13 @@ def title(effect: str) -> str:
 def titles(effects: Iterable[str]) -> str:
     """List ids in words, separated by commas."""
     return ", ".join(map(title, effects))
+
+
+def spoken(channel: str) -> str:
+    """Name of a recorded channel in words, without its unit: "motor_position_rad" -> "motor position"."""
+    unit = unit_of(channel)
+    ending = next((one for one in (unit.replace(" ", "_").lower(),) if channel.endswith(f"_{one}")), "")
+    return title(channel.removesuffix(f"_{ending}"))
 
 
 def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
@@ -103,7 +110,7 @@ def where(location: Location, turns: bool) -> dict[str, str]:
     found = {
         "block": title(location.block),
         "element": location.element,
-        "channels": ", ".join(location.channels),
+        "channels": ", ".join(map(spoken, location.channels)),
         "phases of motion": ", ".join(phases),
         "windows of the first recording": ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in location.windows_s),
     }

@@ -1,6 +1,6 @@
 """Matplotlib figures in the style of every report. Matplotlib is loaded when this module is."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 from hil.arrays import FloatArray
 from hil.figures.panels import NOISE, Panel, thin
 
+WIDTH_IN = 7.4  # of a picture: its letters are as large as those of a page of 700 px
 DRAWN_ROWS = 6000  # of a line: several per column of pixels
 
 
 def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: slice = slice(None)) -> Figure:
     """Draw panels one above the other over a common time axis (n,) [s], restricted to `rows`."""
-    figure = Figure(figsize=(10.0, 0.8 + 1.75 * len(panels)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 0.8 + 1.75 * len(panels)), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     time_s = time_s[rows]
     for axis, panel in zip(axes, panels, strict=True):
@@ -68,7 +69,23 @@ def legend_above(axis: Axes, handles: Sequence[object] | None = None) -> None:
     )
 
 
+def legend_outside(figure: Figure, axes: Iterable[Axes], columns: int = 4) -> None:
+    """Put one legend above all axes of a figure, each label once."""
+    labelled = [axis.get_legend_handles_labels() for axis in axes]
+    known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
+    figure.legend(
+        known.values(),
+        known.keys(),
+        loc="outside upper center",
+        ncols=columns,
+        frameon=False,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        handlelength=1.6,
+    )
+
+
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG and return the path."""
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=140)
     return path

@@ -12,6 +12,7 @@ from hil.quantities import ReadingUnit, reading_unit
 # distinguishable with colour blindness (Okabe and Ito 2008)
 MEASURED, SIMULATED, COMMAND, DEVIATION, NOISE = "#0072b2", "#d55e00", "#555555", "#a3195b", "#999999"
 GOOD, WARNING = "#00734d", "#b34700"
+GOOD_IN_DARK, WARNING_IN_DARK = "#3fc08f", "#ff9a4d"
 
 
 @dataclass(frozen=True, eq=False)

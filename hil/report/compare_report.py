@@ -13,7 +13,7 @@ from hil.identification.inverse_dynamics import InverseDynamics
 from hil.identification.nominal_fit import FitResult
 from hil.identification.terms import ambiguous
 from hil.identification.twin_deviation import BlockDeviation, Deviation
-from hil.quantities import change, digits, percent, quantity
+from hil.quantities import change, digits, percent, quantity, with_error
 from hil.report import plots
 from hil.report.page import Page
 
@@ -78,8 +78,8 @@ def parameter_rows(fit: FitResult) -> list[tuple[str, ...]]:
 
 def fitted_cells(nominal: float, value: float, error: float) -> tuple[str, str, str, str]:
     """Cells of a fitted value: bench file, fitted, standard error (infinite: at its bound), change."""
-    shown = "at its bound" if math.isinf(error) else digits(error, 2)
-    return digits(nominal, 4), digits(value, 5), shown, change(value, nominal)
+    shown, of_error = (digits(value, 4), "at its bound") if math.isinf(error) else with_error(value, error)
+    return digits(nominal, 4), shown, of_error, change(value, nominal)
 
 
 def verdict(result: Comparison) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from hil.figures.panels import GOOD, WARNING
+from hil.figures.panels import GOOD, GOOD_IN_DARK, WARNING, WARNING_IN_DARK
 from hil.files.output import write_text
 
 _TEMPLATE = Path(__file__).with_name("page.html.j2")
@@ -77,5 +77,7 @@ class Page:
             divisions=[Markup(division) for division in divisions],
             good_colour=GOOD,
             warning_colour=WARNING,
+            good_in_dark=GOOD_IN_DARK,
+            warning_in_dark=WARNING_IN_DARK,
         )
         write_text(path, html)

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from hil.diagnosis.result import Result
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import spoken, title
 from hil.quantities import percent, quantity
 from hil.report.console import out, table
-from hil.report.diagnosis_report import torque_line
+from hil.report.fit_section import torque_line
 
 
 def print_diagnosis(result: Result, report: Path) -> None:
@@ -14,7 +14,7 @@ def print_diagnosis(result: Result, report: Path) -> None:
     held_out = result.fit and next(iter(result.fit.values())).validate_
     rows = [
         (
-            name,
+            spoken(name),
             *(
                 quantity(value, entry.unit)
                 for value in (figures.best_before_rms, figures.after_rms, figures.noise_floor_rms)

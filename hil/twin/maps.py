@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 KNOTS = 6
 

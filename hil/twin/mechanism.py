@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 from hil.arrays import FloatArray
 from hil.twin.parameter import Dimension, Parameter, Role, default_starts, default_typical
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 PARAMETERS = 8  # the most parameters a mechanism may have
@@ -71,25 +72,6 @@ class Moment(NamedTuple):
     table_position_m: float
     ratio_m: float  # m of the table per unit of the motor
     viscous_speed: float  # of the motor, at which viscous friction equals Coulomb friction; 0: there is none
-
-
-class Picture(StrEnum):
-    """Figure of the report that shows a mechanism."""
-
-    TIME = "time"
-    FORCE = "force over time"
-    FRICTION = "friction"  # over speed
-    FRICTION_ALONG_TRAVEL = "friction along travel"
-    POSITION = "position"  # torque over position
-    POSITION_TABLE = "position, table"  # table reading over position
-    MOTOR_ANGLE = "motor angle"
-    MOTOR_ANGLE_PER_TORQUE = "motor angle, per torque"
-    MOTOR_ANGLE_TABLE = "motor angle, table"
-    SCREW_ANGLE = "screw angle"
-    SIGNAL_PERIOD = "signal period"
-    LOST_MOTION = "lost motion"
-    DRIVE_LAW = "drive law"
-    SPECTRUM = "spectrum"
 
 
 class Contact(StrEnum):

@@ -8,13 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.diagnosis.pictures.view import label_of_channel, unit_of_channel
-from hil.diagnosis.search.disturbance import disturbance
+from hil.diagnosis.pictures.view import label_of_channel, torque_of, unit_of_channel
 from hil.errors import InputError
-from hil.figures.drawing import legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, SIMULATED, thin
 from hil.identification.estimator import Fit
-from hil.identification.residual_scales import inertia
 from hil.quantities import reading_unit
 
 if TYPE_CHECKING:
@@ -32,7 +30,7 @@ def change_figure(diagnosis: Diagnosis) -> Figure:
     change = diagnosis.reported.judged.change
     if change is None:
         raise InputError("change: the axis did not change between or during these recordings")
-    figure = Figure(figsize=(10.0, 1.0 + 2.4 * len(change.runs)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 1.0 + 2.4 * len(change.runs)), layout="constrained")
     axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
     nominal = diagnosis.nominal
     for axis, run in zip(axes, change.runs, strict=True):
@@ -69,5 +67,5 @@ def _residual(fit: Fit, channel: str) -> FloatArray:
     """Residual (n,) of the only run of a fit; that of the motor as the torque that causes it."""
     (run,), (channels,) = fit.data.runs, fit.residuals.channels
     if channel == "motor":
-        return disturbance(run, channels["motor"], inertia(fit.bench), fit.data.observer_s).torque
+        return torque_of(run, channels["motor"], fit.bench, fit.data.observer_s).torque
     return channels[channel]

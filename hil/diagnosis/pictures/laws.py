@@ -1,182 +1,237 @@
-"""Figures of physical laws: friction over speed, lost motion over load, torque over its command."""
+"""Laws that are a function of one quantity: over what each is drawn, and how it enters the residual."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.diagnosis.pictures.view import Captioned, Curve, View, around, binned, longest, three_curves, unit_of_channel
-from hil.diagnosis.turning import speed_unit
-from hil.figures.drawing import style_axis
-from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED
-from hil.identification.derivatives import motion, smoothed, window_rows
-from hil.identification.estimator import Fit
-from hil.identification.measured import Measured
+from hil.diagnosis.pictures.fitted_law import LawRows, law_at
+from hil.diagnosis.pictures.view import View, label_of_channel, unit_of_channel
 from hil.identification.residual_scales import inertia
-from hil.quantities import reading_unit
+from hil.identification.terms import Term
+from hil.twin.library import BY_ID
+from hil.twin.parameter import Role
+from hil.twin.picture import Picture
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
 
-CLOUD_POINTS = 8000  # of a scatter plot: more points overlap
-REVERSAL_S, STEEPEST_S = 0.4, 0.05  # shown before and after: a reversal with its ramps, a step of the current loop
+Of = Callable[["Diagnosis", View], FloatArray]
+ZERO_ROWS = 2000  # that tell the zero of a residual
+SLOW_HZ, LEAST_ROWS = 20.0, 300  # a torque that the observer passes; of so many rows, else all count
+LEAST_SHARE = 0.1  # of the largest carrier: rows below say nothing of a law that is multiplied by it
 
 
-def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-    """Draw motor torque - J a over speed, measured and of the twin, beside the friction laws."""
-    final = diagnosis.final
-    factor, unit_of_speed = speed_unit(diagnosis.given_bench.axis.turns)
-    to_read = factor * diagnosis.given_bench.axis.ratio_m_rad
-    fastest = max(float(np.abs(view.torque.velocity).max()) for view in views)
-    edges = np.geomspace(1e-3 * fastest, fastest, 45)
-    figure = Figure(figsize=(10.0, 5.6), layout="constrained")
-    axis = figure.subplots()
-    measured = [_friction_of(final, view.run, view.run.motor, view.run.torque) for view in views]
-    simulated = [_friction_of(final, view.run, *_answer(final, view)) for view in views]
-    for sign, marker, colour, dash, name in (
-        (1.0, "^", MEASURED, "-", "positive"),
-        (-1.0, "v", DEVIATION, "--", "negative"),
-    ):
-        speed, friction, spread = binned(*_one_direction(measured, sign), edges)
-        label = f"measured, {name} direction"
-        axis.errorbar(
-            speed * to_read, friction, spread, fmt=marker, color=colour, markersize=5, linewidth=0.8, label=label
-        )
-        speed, friction, _ = binned(*_one_direction(simulated, sign), edges)
-        label = f"twin with the findings, {name}"
-        axis.plot(speed * to_read, friction, color=SIMULATED, marker=".", linestyle=dash, linewidth=1.8, label=label)
-    for name, fit, dash in (
-        ("bench file", diagnosis.searched.given, ":"),
-        ("nominal twin, refitted", diagnosis.nominal, "-."),
-    ):
-        physics = fit.bench.axis.physics()
-        law = physics.coulomb_n_m + physics.viscous_n_m_s_rad * edges
-        axis.plot(edges * to_read, law, color=COMMAND, linestyle=dash, label=name)
-    axis.set_xscale("log")
-    unit = "N" if diagnosis.given_bench.axis.linear else "N m"
-    style_axis(axis, f"friction [{unit}]", f"speed of the table [{unit_of_speed}]", "Friction over speed")
-    axis.legend(frameon=False, ncols=2)
-    how = (
-        "simulated from the same set-points" if final.data.observability.closed_loop else "held on the measured motion"
-    )
-    return Captioned(
-        figure,
-        "Motor torque - inertia × acceleration where the acceleration is small: median and quartiles of the samples in "
-        f"each range of speed. The twin with the findings is {how} and evaluated alike.",
-    )
+@dataclass(frozen=True)
+class Abscissa:
+    """A quantity (n,) of a run in SI units, its label, and that of its inverse: how often something repeats."""
+
+    of: Of
+    label: str
+    unit: Callable[[Diagnosis], str]
+    per: str = ""  # label of an order: what repeats over this quantity
+    per_unit: float = 1.0  # of the quantity to which an order refers
 
 
-def _answer(final: Fit, view: View) -> tuple[FloatArray, FloatArray]:
-    """Motor position and torque (n,) of the twin: in closed loop, else that of the measured motion.
+@dataclass(frozen=True)
+class DrawnLaw:
+    """How a law is drawn: over which quantity, in which channel, and by which factor it enters the residual there.
 
-    Without a control law the torque is the measured one with the disturbance that the twin lacks.
+    `value(term, diagnosis, x)` is the law (n,) in the unit `unit`. `bare` is what it is without the mechanism.
     """
-    if not final.data.observability.closed_loop:
-        return view.run.motor, view.run.torque + view.torque.torque - view.torque_modelled.torque
-    response = final.hypothesis.respond(view.run)
-    return response.motor_position, response.torque
+
+    over: Abscissa
+    value: Callable[[Term, Diagnosis, FloatArray], FloatArray]
+    label: str = ""  # without: that of the channel
+    unit: str = ""  # without: that of the channel
+    channel: Callable[[View], str] = lambda view: "motor"
+    carrier: Callable[[Diagnosis, View], FloatArray] = lambda diagnosis, view: np.ones(view.run.motor.size)
+    period: Callable[[Term], float | None] = lambda term: None
+    bare: Callable[[FloatArray], FloatArray] = np.zeros_like
+
+    def rows(self, diagnosis: Diagnosis, view: View) -> LawRows:
+        """The rows of a run in which the axis slides and the law enters."""
+        before, after = view.residuals(self.channel(view))
+        carrier = self.carrier(diagnosis, view)
+        used = view.torque.sliding & (np.abs(carrier) > LEAST_SHARE * float(np.abs(carrier).max()))
+        used[: view.run.evaluated.start] = False
+        x, period = self.over.of(diagnosis, view), self.period(view.term)
+        slow = np.abs(np.gradient(x, view.run.period_s)) < SLOW_HZ * (period or np.inf)
+        if self.channel(view) == "motor" and np.count_nonzero(used & slow) >= LEAST_ROWS:
+            used &= slow  # the observer attenuates a quicker torque
+        if self.channel(view) == "table" and used.any():  # the zeros of both encoders are arbitrary
+            some = np.flatnonzero(used)[:: max(np.count_nonzero(used) // ZERO_ROWS, 1)]
+            law = carrier[some] * self.value(view.term, diagnosis, x[some])
+            before = before - float(np.mean((before - after)[some] - law))
+        return LawRows(x, carrier, before, after, used)
+
+    def labelled(self, diagnosis: Diagnosis, view: View) -> tuple[str, str]:
+        """Label and SI unit of what is drawn."""
+        channel = self.channel(view)
+        label = self.label or label_of_channel(diagnosis, channel)
+        unit = {"": unit_of_channel(diagnosis, channel), "force": "N"}.get(self.unit, self.unit)
+        return label, unit
 
 
-def _friction_of(final: Fit, run: Measured, motor: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Speed and friction (m,) of the rows in which the axis moves with little acceleration."""
-    moved, window = motion(motor, run.period_s), window_rows(run.period_s)
-    velocity, inertial = moved.velocity, inertia(final.bench) * moved.acceleration
-    friction = smoothed(torque, run.period_s) - inertial
-    coulomb = final.bench.axis.physics().coulomb_n_m
-    # the slip of a stick-slip cycle is shorter than the filter window; at higher speed J a is known well
-    share = np.where(np.abs(velocity) > 0.05 * np.abs(velocity).max(), 1.0, 0.1)
-    rows = (np.abs(inertial) < share * coulomb) & (np.abs(velocity) > 0.0)
-    rows[: run.evaluated.start + window] = rows[-window:] = False
-    return velocity[rows], friction[rows]
+def _length(diagnosis: Diagnosis) -> str:
+    return "rad" if diagnosis.given_bench.axis.turns else "m"
 
 
-def _one_direction(found: Sequence[tuple[FloatArray, FloatArray]], sign: float) -> tuple[FloatArray, FloatArray]:
-    """Absolute speed and friction against the motion, of one direction."""
-    speed, friction = (sign * np.concatenate(column) for column in zip(*found, strict=True))
-    return speed[speed > 0.0], friction[speed > 0.0]
+def _drive(diagnosis: Diagnosis) -> str:
+    return diagnosis.given_bench.axis.drive_unit
 
 
-def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-    """Draw table - motor position over the acceleration and, at one reversal, over time."""
-    run = longest(views).run
-    stretch = run.table_m - diagnosis.given_bench.axis.ratio_m_rad * run.motor
-    stretch = stretch - np.mean(stretch)  # the zero of the linear encoder is arbitrary
-    factor, unit = reading_unit(unit_of_channel(diagnosis, "table"), float(np.abs(stretch).max()))
-    curves = three_curves(diagnosis, run, "table", stretch)
-    acceleration = motion(run.table_m, run.period_s, smooth_s=0.009).acceleration
-    figure = Figure(figsize=(10.0, 5.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    label = f"table - motor position [{unit}]"
-    _cloud(left, acceleration, curves, run, factor)
-    style_axis(left, label, "acceleration of the table [m/s²]: load of the transmission", "Over the load")
-    _traces(right, curves, run, _reversal(run), factor)
-    style_axis(right, label, "time [s]", "At one reversal")
-    return Captioned(
-        figure,
-        "Table against motor: compliance shows as a slope over the load, lost motion as a step at the change of sign "
-        "of the load, independent of its magnitude.",
-    )
+def _angle(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return view.run.motor * diagnosis.given_bench.axis.physics().angle_per_unit
 
 
-def torque_over_command(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-    """Draw torque over its command and over time, measured and of both twins."""
-    run = longest(views).run
-    curves = three_curves(diagnosis, run, "torque", run.torque)
-    unit = "N" if diagnosis.given_bench.axis.linear else "N m"
-    figure = Figure(figsize=(10.0, 5.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    _cloud(left, run.torque_command, curves, run)
-    style_axis(left, f"torque [{unit}]", f"torque command [{unit}]", "Over the command")
-    window = _steepest(run.torque_command, run)
-    _traces(right, curves, run, window)
-    time_s = run.time_s[window]
-    right.plot(time_s, run.torque_command[window], color="black", linewidth=0.8, linestyle=":", label="command")
-    right.legend(frameon=False)
-    style_axis(right, f"torque [{unit}]", "time [s]", "At the fastest change of the command")
-    return Captioned(figure, "Torque against its command: measured, refitted nominal twin, and twin with the findings.")
+def _position(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return diagnosis.given_bench.axis.ratio_m_rad * view.run.motor
 
 
-def _cloud(axis: Axes, x: FloatArray, curves: Sequence[Curve], run: Measured, factor: float = 1.0) -> None:
-    """Scatter the judged rows of curves over x; the measured points are large and pale."""
-    rows = np.arange(run.evaluated.start, x.size, max(x.size // CLOUD_POINTS, 1))
-    for curve in curves:
-        size, alpha = (5.0, 0.4) if curve.label == "measured" else (1.5, 0.8)
-        axis.plot(
-            x[rows],
-            curve.values[rows] * factor,
-            ".",
-            color=curve.colour,
-            markersize=size,
-            alpha=alpha,
-            markeredgewidth=0.0,
-            label=curve.label,
-            rasterized=True,
-        )
-    axis.legend(frameon=False, markerscale=3.0)
+ANGLE = Abscissa(_angle, "motor angle", lambda d: "rad", "per motor turn", 2.0 * np.pi)
+WAY = Abscissa(_position, "position", _length, "per metre", 1.0)
+# the place by the twin: finer than a count
+SCALE = Abscissa(lambda d, view: view.run.table_m - view.before["table"], "position", _length, "per metre", 1.0)
+TIME = Abscissa(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
+COMMAND = Abscissa(lambda d, view: view.run.torque_command, "torque command", _drive)
 
 
-def _traces(axis: Axes, curves: Sequence[Curve], run: Measured, rows: slice, factor: float = 1.0) -> None:
-    """Draw rows of curves over time; the measured one is wide and pale."""
-    for curve in curves:
-        width, alpha = (2.8, 0.5) if curve.label == "measured" else (1.2, 1.0)
-        values = curve.values[rows] * factor
-        axis.plot(run.time_s[rows], values, color=curve.colour, linewidth=width, alpha=alpha, label=curve.label)
+def _friction(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """Friction (n,) of the axis against the motion, as a torque."""
+    physics, velocity = diagnosis.final.bench.axis.physics(), view.torque.velocity
+    return -(physics.coulomb_n_m * np.sign(velocity) + physics.viscous_n_m_s_rad * velocity)
 
 
-def _reversal(run: Measured) -> slice:
-    """Rows about a reversal of the set-points in the middle of the recording."""
-    moving = np.flatnonzero(np.abs(run.velocity_command_m_s) > 1e-3 * np.abs(run.velocity_command_m_s).max())
-    turns = moving[1:][np.diff(np.sign(run.velocity_command_m_s[moving])) != 0.0]
-    row = int(turns[turns.size // 2]) if turns.size else run.motor.size // 2
-    return around(row, run, REVERSAL_S)
+def _coulomb(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return -diagnosis.final.bench.axis.physics().coulomb_n_m * np.sign(view.torque.velocity)
 
 
-def _steepest(values: FloatArray, run: Measured) -> slice:
-    """Rows about the fastest change of a signal (n,)."""
-    rows = np.convolve(np.abs(np.diff(values)), np.ones(20), "same")
-    return around(int(np.argmax(rows[run.evaluated])) + run.evaluated.start, run, STEEPEST_S)
+def _ratio(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return np.full(view.run.motor.size, diagnosis.given_bench.axis.ratio_m_rad)
+
+
+def _in_proportion(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """What the twin makes of one unit of the law (n,): the part that the term models, over the law."""
+    before, after = view.residuals("table")
+    law = law_at(view.term, diagnosis.final.bench, 1.0, table_m=_position(diagnosis, view)) - 1.0
+    return np.where(np.abs(law) > LEAST_SHARE * np.abs(law).max(), before - after, 0.0) / np.where(law, law, 1.0)
+
+
+def _reading_of_motor(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """A motor that reads too much makes the table read too little; without a table, its error is an acceleration."""
+    if view.has_table:
+        return np.full(view.run.motor.size, -diagnosis.given_bench.axis.ratio_m_rad)
+    return -inertia(diagnosis.final.bench) * view.torque.velocity**2
+
+
+def _table(view: View) -> str:
+    return "table"
+
+
+def _table_or_motor(view: View) -> str:
+    return "table" if view.has_table else "motor"
+
+
+def _torque(view: View) -> str:
+    return view.strongest if view.strongest in ("torque", "motor") else "motor"
+
+
+def _per_order(term: Term) -> float | None:
+    order = BY_ID[term.effect].named(Role.ORDER, term.values)
+    return 2.0 * np.pi / order if order else 2.0 * np.pi
+
+
+def _per_line(term: Term) -> float | None:
+    line = BY_ID[term.effect].named(Role.LINE, term.values)
+    return 1.0 / line if line else None
+
+
+def _period(term: Term) -> float | None:
+    return BY_ID[term.effect].named(Role.PERIOD, term.values)
+
+
+def _at(term: Term, diagnosis: Diagnosis, value: float | FloatArray = 0.0, **state: FloatArray) -> FloatArray:
+    return law_at(term, diagnosis.final.bench, value, **state)
+
+
+def _metres(diagnosis: Diagnosis) -> float:
+    return float(diagnosis.given_bench.axis.ratio_m_rad)
+
+
+LAWS: dict[Picture, DrawnLaw] = {
+    Picture.COGGING: DrawnLaw(ANGLE, lambda term, d, x: _at(term, d, angle_rad=x), period=_per_order),
+    Picture.RIPPLE: DrawnLaw(
+        ANGLE,
+        lambda term, d, x: _at(term, d, 1.0, angle_rad=x) - 1.0,
+        "torque per ampere, change",
+        "1",
+        carrier=lambda d, view: view.run.torque,
+        period=_per_order,
+    ),
+    Picture.LEAD_OVER_TURN: DrawnLaw(
+        ANGLE,
+        lambda term, d, x: _metres(d) * _at(term, d, angle_rad=x),
+        "lead error",
+        channel=_table,
+        period=_per_order,
+    ),
+    Picture.LEAD_OVER_TRAVEL: DrawnLaw(
+        WAY, lambda term, d, x: _metres(d) * _at(term, d, table_m=x), "lead error", channel=_table
+    ),
+    Picture.GROWTH: DrawnLaw(
+        TIME,
+        lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0)),
+        "growth of the screw",
+        "m/m",
+        channel=_table,
+        carrier=_position,
+    ),
+    Picture.MOTOR_READING: DrawnLaw(
+        ANGLE,
+        lambda term, d, x: _at(term, d, angle_rad=x),
+        "error of the motor encoder",
+        "rad",
+        channel=_table_or_motor,
+        carrier=_reading_of_motor,
+        period=_per_order,
+    ),
+    Picture.LOAD_READING: DrawnLaw(
+        WAY, lambda term, d, x: _at(term, d, table_m=x), "error of the load encoder", channel=_table
+    ),
+    Picture.SCALE_READING: DrawnLaw(
+        SCALE, lambda term, d, x: _at(term, d, table_m=x), "error of the linear encoder", channel=_table, period=_period
+    ),
+    Picture.FRICTION_OVER_TRAVEL: DrawnLaw(
+        WAY,
+        lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
+        "Coulomb friction, change",
+        "1",
+        carrier=_coulomb,
+        period=_period,
+    ),
+    Picture.FRICTION_OVER_TIME: DrawnLaw(
+        TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction
+    ),
+    Picture.FORCE_OVER_TRAVEL: DrawnLaw(
+        WAY, lambda term, d, x: _at(term, d, table_m=x), "force on the table", "force", carrier=_ratio
+    ),
+    Picture.FORCE_OVER_TIME: DrawnLaw(
+        TIME, lambda term, d, x: _at(term, d, time_s=x), "force on the table", "force", carrier=_ratio, period=_per_line
+    ),
+    Picture.STIFFNESS: DrawnLaw(
+        WAY,
+        lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
+        "stiffness of the screw, change",
+        "1",
+        channel=_table,
+        carrier=_in_proportion,
+    ),
+    Picture.CHARACTERISTIC: DrawnLaw(
+        COMMAND, lambda term, d, x: _at(term, d, x), "torque", channel=_torque, bare=lambda x: x
+    ),
+}

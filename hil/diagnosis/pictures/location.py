@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
-from hil.diagnosis.location.locate import BLOCKS, block_shares, mismatch_energies, phase_shares, shown_in
+from hil.diagnosis.location.locate import block_shares, mismatch_energies, phase_shares, shown_in
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.turning import speed_unit
-from hil.diagnosis.wording import channel_names, title
-from hil.figures.drawing import style_axis
+from hil.diagnosis.wording import channel_names, spoken, title
+from hil.figures.drawing import WIDTH_IN, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
@@ -30,10 +30,11 @@ def location_figure(diagnosis: Diagnosis) -> Figure:
     """Draw shares of the residual energy by block and phase, and its mean over position, speed and time."""
     before = shown_in(reference_fit(diagnosis), diagnosis.held_out)
     seen = mismatch_energies(before, diagnosis.final)
-    figure = Figure(figsize=(10.0, 8.2), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 8.2), layout="constrained")
     axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
-    blocks = {title(BLOCKS[name][0]): share for name, share in block_shares(before).items()}
-    _shares(axes["block"], blocks, "Block with the mismatch in its output")
+    names = channel_names(diagnosis.given_bench, diagnosis.train.runs[0])
+    blocks = {spoken(names[name]): share for name, share in block_shares(before).items()}
+    _shares(axes["block"], blocks, "Channel that shows it")
     _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
     excess = np.concatenate([energy.rows for energy in seen])
     position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])
@@ -77,8 +78,7 @@ def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
             for fit in (reference_fit(diagnosis), diagnosis.final)
         )
         lines = Line("before", first, COMMAND, broad=True), Line("after", second, SIMULATED)
-        label = recorded.removesuffix("_rad").removesuffix("_n_m").removesuffix("_m").removesuffix("_n")
-        panels.append(Panel(f"{label.replace('_', ' ')}\n{title(entry.mode)}", entry.unit, lines, floor))
+        panels.append(Panel(f"{spoken(recorded)}\n{title(entry.mode)}", entry.unit, lines, floor))
     return panels
 
 
@@ -89,7 +89,7 @@ def _judged(values: FloatArray, run: Measured) -> FloatArray:
 def _shares(axis: Axes, shares: dict[str, float], heading: str) -> None:
     axis.barh(list(shares), [100.0 * share for share in shares.values()], color=MEASURED)
     axis.invert_yaxis()
-    axis.set_xlabel("share of the energy above the noise [%]")
+    axis.set_xlabel("energy above the noise [%]")
     axis.set_title(heading, loc="left")
 
 

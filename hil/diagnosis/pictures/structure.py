@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hil.diagnosis.structure_left import OFFSET, TORQUE, Dependence
-from hil.figures.drawing import style_axis
+from hil.figures.drawing import WIDTH_IN, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.quantities import reading_unit
 
@@ -29,7 +29,7 @@ def structure_figure(diagnosis: Diagnosis) -> Figure | None:
     shown = [one for one in judged.structure if one.question.name != OFFSET][:MOST]
     if not shown:
         return None
-    figure = Figure(figsize=(10.0, 0.6 + 2.6 * len(shown)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 0.6 + 2.6 * len(shown)), layout="constrained")
     axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
     mapped = {id(one.dependence): one.term.values for one in judged.unnamed}
     for axis, one in zip(axes, shown, strict=True):
@@ -60,8 +60,7 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
         axis.errorbar(along * x, y, error, color=colour, label=label, fmt="o-", markersize=4, capsize=3, linewidth=0.8)
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
-    chance = f"by chance {one.found.p:.1g}" if one.found.p > 1e-12 else "by chance less than 1e-12"
-    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name}; {chance}"
+    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name}"
     style_axis(axis, f"{what}\n[{unit}]", f"{one.question.name} [{along_unit}]", title)
     if turn:
         axis.legend(frameon=False)

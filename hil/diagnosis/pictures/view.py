@@ -10,17 +10,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
 from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
-from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.identification.measured import Measured
-from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
 
-BIN_SAMPLES_MIN = 8  # samples of a drawn bin: quartiles of fewer have a large variance
 CHANNEL_LABELS = {
     "motor": "torque on the motor",
     "table": "table - motor position",
@@ -42,49 +40,60 @@ class View:
 
     term: Term
     run: Measured
-    measured: dict[str, FloatArray]  # residuals (n,) of the twin without the term, by channel
-    modelled: dict[str, FloatArray]  # part of them (n,) that the term models
-    torque: Disturbance  # the motor's residual as a torque on the motor
-    torque_modelled: Disturbance
+    before: dict[str, FloatArray]  # residuals (n,) of the twin without the term, by channel
+    after: dict[str, FloatArray]  # those (n,) of the final twin
+    torque: Disturbance  # the motor's residual before as a torque on the motor
+    torque_after: Disturbance
 
-    def residual(self, channel: str, modelled: bool) -> FloatArray:
-        """Residual (n,) or its modelled part; that of the motor as the torque that causes it."""
+    def residuals(self, channel: str) -> tuple[FloatArray, FloatArray]:
+        """Residuals (n,) before and after; those of the motor as the torque that causes them."""
         if channel == "motor":
-            return (self.torque_modelled if modelled else self.torque).torque
-        return (self.modelled if modelled else self.measured)[channel]
+            return self.torque.torque, self.torque_after.torque
+        return self.before[channel], self.after[channel]
+
+    @property
+    def has_table(self) -> bool:
+        """True if a second encoder is recorded."""
+        return bool(self.run.table_m.size)
+
+    @property
+    def shows_delay(self) -> str:
+        """Channel that shows a delay best: the difference of two encoders needs no model of the axis."""
+        size = self._sizes()
+        strongest = max(size, key=lambda name: size[name])
+        return "table" if size.get("table", 0.0) > 0.5 * size[strongest] else strongest
+
+    @property
+    def strongest(self) -> str:
+        """Channel in which the term is largest against the noise."""
+        size = self._sizes()
+        return max(size, key=lambda name: size[name])
+
+    def _sizes(self) -> dict[str, float]:
+        return {
+            name: float(np.sqrt(np.mean((values - self.after[name])[self.run.evaluated] ** 2))) / noise(self.run, name)
+            for name, values in self.before.items()
+        }
 
 
 Drawer = Callable[["Diagnosis", Sequence[View]], Captioned]
 
 
-class Curve(NamedTuple):
-    """A signal (n,) of one run, measured or simulated, with its label and colour."""
-
-    label: str
-    values: FloatArray
-    colour: str
-
-
 def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
     """Simulate a run without a term of the final hypothesis."""
     final, observer_s = diagnosis.final, diagnosis.train.observer_s
-    measured = without_terms(final.hypothesis, term).blocks(run, observer_s)
-    left = diagnosis.residuals(final, run)
-    modelled = {name: measured[name] - left[name] for name in measured}
-    torque, torque_modelled = (
-        disturbance(run, values["motor"], inertia(final.bench), observer_s) for values in (measured, modelled)
-    )
-    return View(term, run, measured, modelled, torque, torque_modelled)
+    before = without_terms(final.hypothesis, term).blocks(run, observer_s)
+    after = diagnosis.residuals(final, run)
+    torque, torque_after = (torque_of(run, values["motor"], final.bench, observer_s) for values in (before, after))
+    return View(term, run, before, after, torque, torque_after)
 
 
-def three_curves(diagnosis: Diagnosis, run: Measured, channel: str, measured: FloatArray) -> list[Curve]:
-    """A signal (n,) measured, simulated by the refitted nominal twin, and simulated by the final twin."""
-    nominal, final = (measured - diagnosis.residuals(fit, run)[channel] for fit in (diagnosis.nominal, diagnosis.final))
-    return [
-        Curve("nominal twin, refitted", nominal, COMMAND),
-        Curve("measured", measured, MEASURED),
-        Curve("twin with the findings", final, SIMULATED),
-    ]
+def torque_of(run: Measured, left: FloatArray, bench: Bench, observer_s: float) -> Disturbance:
+    """The motor's residual (n,) as the torque that causes it: the observer moves the motor's side of the transmission
+    as one body, so that its inertia counts."""
+    chain = bench.axis.physics().chain
+    side = chain.side(chain.motor)
+    return disturbance(run, left, float(side @ chain.inertia_kg_m2 @ side), observer_s)
 
 
 def longest(views: Sequence[View]) -> View:
@@ -109,28 +118,6 @@ def label_of_channel(diagnosis: Diagnosis, channel: str) -> str:
 def noise(run: Measured, channel: str) -> float:
     """White noise (1 sigma) of a residual."""
     return {"motor": run.noise.motor, "table": run.noise.table_m}.get(channel, run.noise.torque)
-
-
-def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centres (m,), medians (m,) and distances to the quartiles (2, m) of y in bins of x; NaN with too few samples."""
-    index = np.digitize(x, edges) - 1
-    quartiles = np.full((edges.size - 1, 3), np.nan)
-    for i in range(edges.size - 1):
-        if np.count_nonzero(index == i) >= BIN_SAMPLES_MIN:
-            quartiles[i] = np.percentile(y[index == i], [25.0, 50.0, 75.0])
-    low, middle, high = quartiles.T
-    return 0.5 * (edges[:-1] + edges[1:]), middle, np.stack([middle - low, high - middle])
-
-
-def angle(diagnosis: Diagnosis, view: View) -> FloatArray:
-    """Angle of the motor within its revolution [deg]."""
-    turned = view.run.motor * diagnosis.given_bench.axis.physics().angle_per_unit
-    return np.asarray(np.degrees(np.mod(turned, 2.0 * np.pi)))
-
-
-def position(diagnosis: Diagnosis, view: View) -> FloatArray:
-    """Position by the motor encoder [mm]."""
-    return np.asarray(1e3 * diagnosis.given_bench.axis.ratio_m_rad * view.run.motor)
 
 
 def around(row: int, run: Measured, half_s: float) -> slice:

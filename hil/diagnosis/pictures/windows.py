@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from hil.diagnosis.pictures.view import Captioned, View
-from hil.diagnosis.search.disturbance import disturbance
-from hil.figures.drawing import style_axis
+from hil.diagnosis.pictures.view import Captioned, View, torque_of
+from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
-from hil.identification.residual_scales import inertia
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
@@ -26,19 +24,20 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     shown = sorted(views, key=lambda view: not view.term.windows_of(view.run.name))[:MOST_RUNS]
     shown.sort(key=lambda view: view.run.start.time_s)
     ratio = diagnosis.given_bench.axis.ratio_m_rad
-    figure = Figure(figsize=(10.0, 2.6 + 2.2 * len(shown)), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, 1.8 + 2.0 * len(shown)), layout="constrained")
     axes = np.atleast_1d(figure.subplots(len(shown), 1))
     for axis, view in zip(axes, shown, strict=True):
         run, observer_s = view.run, diagnosis.train.observer_s
         given = diagnosis.residuals(diagnosis.searched.given, run)["motor"]
-        of_bench_file = disturbance(run, given, inertia(diagnosis.given_bench), observer_s).torque / ratio
-        curves = view.torque_modelled.torque / ratio, view.torque.torque / ratio, of_bench_file
+        of_bench_file = torque_of(run, given, diagnosis.given_bench, observer_s).torque / ratio
+        modelled = view.torque.torque - view.torque_after.torque
+        curves = modelled / ratio, view.torque.torque / ratio, of_bench_file
         rows = slice(run.evaluated.start, None)
         chosen = thin(tuple(values[rows] for values in curves), DRAWN_ROWS)
         looks = (
-            ("modelled by the event", SIMULATED, 3.0, 0.5),
-            ("measured - twin without the event", MEASURED, 1.2, 1.0),
-            ("measured - twin of the bench file", COMMAND, 0.7, 1.0),
+            ("fitted", SIMULATED, 3.0, 0.5),
+            ("measured, without it", MEASURED, 1.2, 1.0),
+            ("measured, bench file", COMMAND, 0.7, 1.0),
         )
         for values, (label, colour, width, alpha) in zip(curves, looks, strict=True):
             time_s, drawn = run.time_s[rows][chosen], values[rows][chosen]
@@ -49,7 +48,7 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         if strongest > 0.0:  # peaks at reversals would hide the windows
             axis.set_ylim(-1.6 * strongest, 1.6 * strongest)
         style_axis(axis, "force [N]", title=run.name)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=3, frameon=False)
+    legend_outside(figure, axes[:1])
     axes[-1].set_xlabel("time [s]")
     return Captioned(
         figure,

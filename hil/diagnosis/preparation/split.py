@@ -21,6 +21,11 @@ _LONG_REST = 0.2  # of the recording: a third keeps less than half of its motion
 _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encoder
 
 
+def whole_name(name: str) -> str:
+    """Name of the recording of which one with this name may be a part."""
+    return name.removesuffix(f" ({_FIRST})").removesuffix(f" ({_LAST})")
+
+
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
     """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 

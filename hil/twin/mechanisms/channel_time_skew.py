@@ -9,6 +9,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import Scene
 
 _MOST_S = 0.01
@@ -98,6 +99,7 @@ MECHANISM = Mechanism(
     ),
     text=Text(
         "The channel {variant} is recorded {delay_s} late against the others.",
+        Picture.DELAY,
         reversed="The channel {variant} is recorded {delay_s} early against the others.",
     ),
     # motor position and torque are the clock unless their relation says otherwise: the first variant is named

@@ -4,8 +4,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -25,7 +26,7 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.MOTOR_TORQUE, _cogging),),
-    text=Text("The motor cogs with {amplitude_n_m}, {wave}.", Picture.MOTOR_ANGLE),
+    text=Text("The motor cogs with {amplitude_n_m}, {wave}.", Picture.COGGING),
     search=SearchHints(
         lambda s: [(0.01 * s.coulomb, order, 0.0) for order in s.orders],
         lambda a: (0.02 * a.rated_torque, 12.0, 0.0),

@@ -2,8 +2,9 @@
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -22,7 +23,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TRANSMISSION, _longer_lead),),
     text=Text(
         "The lead is wrong: the table goes {slope_m_m} too far for each metre of travel.",
-        Picture.POSITION_TABLE,
+        Picture.LEAD_OVER_TRAVEL,
         reversed="The lead is wrong: the table goes {slope_m_m} too little for each metre of travel.",
     ),
     search=SearchHints(lambda s: [(1e-6 / s.travel_m,)], lambda a: (20e-6,), needs_table=True),

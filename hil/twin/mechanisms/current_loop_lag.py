@@ -4,8 +4,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -36,6 +37,6 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _lagging_current, "measured"),
         Variant(Stage.TORQUE, _lagging_current, "hidden"),
     ),
-    text=Text("The motor current follows its command with a time constant of {time_constant_s}.", Picture.DRIVE_LAW),
+    text=Text("The motor current follows its command with a time constant of {time_constant_s}.", Picture.DELAY),
     search=SearchHints(lambda s: [(2e-4,), (1e-3,)], lambda a: (5e-4,), proportional=False),
 )

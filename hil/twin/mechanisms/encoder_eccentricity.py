@@ -7,8 +7,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -28,7 +29,7 @@ MECHANISM = Mechanism(
     ),
     variants=(Variant(Stage.MOTOR_READING, _eccentric_reading),),
     text=Text(
-        "The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.", Picture.MOTOR_ANGLE_TABLE
+        "The motor encoder sits off centre: it errs by {amplitude_rad} once per revolution.", Picture.MOTOR_READING
     ),
     search=SearchHints(typical=lambda a: (2e-4 / a.angle_per_unit, 0.0)),
 )

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 _LEAST = 1e-3  # share of the travel beyond the edge, below which a stop is not reached
@@ -70,7 +71,7 @@ MECHANISM = Mechanism(
     ),
     text=Text(
         "From {edge_m} to the upper end of the travel, an elastic stop of {stiffness_n_m} pushes the table back.",
-        Picture.POSITION,
+        Picture.FORCE_OVER_TRAVEL,
     ),
     search=SearchHints(typical=lambda a: (100.0 * a.friction / a.ratio, 0.1)),
     valid=_is_at_an_end,

@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 _ONE = "From {start_s} to {end_s} a force of {force_n} acts on the table (positive forwards)."
 _SEVERAL = (

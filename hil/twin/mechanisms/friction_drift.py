@@ -6,6 +6,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -27,6 +28,9 @@ MECHANISM = Mechanism(
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(Variant(Stage.FRICTION_SCALE, _warming),),
-    text=Text("Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}."),
+    text=Text(
+        "Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}.",
+        Picture.FRICTION_OVER_TIME,
+    ),
     search=SearchHints(lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], lambda a: (0.2, 600.0)),
 )

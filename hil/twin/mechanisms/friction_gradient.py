@@ -5,8 +5,9 @@ A guide out of line, a cover or a cable that is dragged along, or a nut that wea
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -24,6 +25,6 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.COULOMB, _rising_level),),
     text=Text(
         "Friction changes along the travel by {slope_1_m}, as a share of its level at position zero.",
-        Picture.FRICTION_ALONG_TRAVEL,
+        Picture.FRICTION_OVER_TRAVEL,
     ),
 )

@@ -7,8 +7,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -27,7 +28,7 @@ MECHANISM = Mechanism(
         Parameter("angle_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _pull_down),),
-    text=Text("Gravity turns the load with up to {gravity_torque_n_m}.", Picture.POSITION),
+    text=Text("Gravity turns the load with up to {gravity_torque_n_m}.", Picture.FORCE_OVER_TRAVEL),
     search=SearchHints(lambda s: [(0.1 * s.coulomb / s.ratio, 0.0)], lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     told_by_m=lambda values, a: 0.0,
     turning=True,

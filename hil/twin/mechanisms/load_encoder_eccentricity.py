@@ -8,8 +8,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -30,7 +31,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TABLE_READING, _eccentric_reading),),
     text=Text(
         "The load encoder sits off centre: it errs by {amplitude_rad} once per revolution of the load.",
-        Picture.POSITION_TABLE,
+        Picture.LOAD_READING,
     ),
     search=SearchHints(lambda s: [(1e-5, 0.0)], lambda a: (2e-4, 0.0), needs_table=True),
     turning=True,

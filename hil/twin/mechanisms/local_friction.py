@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 # Shortest flank [m]: an axis needs several internal steps for it, so that the twin is continuous in the edges.
@@ -59,7 +60,7 @@ MECHANISM = Mechanism(
     text=Text(
         "From {begin_m} to {end_m} of the travel, friction is higher by a share of {fraction}; it changes over "
         "{flank_m} at either end.",
-        Picture.FRICTION_ALONG_TRAVEL,
+        Picture.FRICTION_OVER_TRAVEL,
         reversed="From {begin_m} to {end_m} of the travel, friction is lower by a share of {fraction}; it changes over "
         "{flank_m} at either end.",
     ),

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 _LEAST_WAVES = 5.0  # in the recording: fewer are a drift
@@ -40,7 +41,7 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _shake),),
-    text=Text("A force of {force_n} at {frequency_hz} acts on the table all the time.", Picture.SPECTRUM),
+    text=Text("A force of {force_n} at {frequency_hz} acts on the table all the time.", Picture.FORCE_OVER_TIME),
     search=SearchHints(
         lambda s: [(0.1 * s.coulomb / s.ratio, frequency_hz, 0.0) for frequency_hz in s.lines_hz],
         lambda a: (0.2 * a.friction / a.ratio, 7.0, 0.0),

@@ -7,8 +7,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -39,7 +40,7 @@ MECHANISM = Mechanism(
     text=Text(
         "The lead errs with the angle of the screw: by {amplitude_m} once, {amplitude_2_m} twice and "
         "{amplitude_3_m} three times per revolution.",
-        Picture.SCREW_ANGLE,
+        Picture.LEAD_OVER_TURN,
     ),
     search=SearchHints(lambda s: [(0.5e-6, 0.0, 0.0, 0.0, 0.0, 0.0)], lambda a: (2e-6, 0.0)),
 )

@@ -4,8 +4,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -30,7 +31,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.COULOMB, _level_along_travel),),
     text=Text(
         "Friction varies by a share of {fraction} along the travel, with a period of {period_m}.",
-        Picture.FRICTION_ALONG_TRAVEL,
+        Picture.FRICTION_OVER_TRAVEL,
     ),
     search=SearchHints(typical=lambda a: (0.1, 0.1, 0.0), screw_locked=True),
     most=2,

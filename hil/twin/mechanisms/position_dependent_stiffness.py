@@ -4,6 +4,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -19,7 +20,9 @@ MECHANISM = Mechanism(
     source="Zaeh, Oertli and Milberg, CIRP Annals 53 (2004) 289, screw stiffness over the position of its nut",
     parameters=(Parameter("relative_slope", Dimension.PER_LENGTH, -10.0, 10.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.SCREW, _stiffness_along_travel),),
-    text=Text("The stiffness of the screw changes by a share of {relative_slope} for each metre of travel."),
+    text=Text(
+        "The stiffness of the screw changes by a share of {relative_slope} for each metre of travel.", Picture.STIFFNESS
+    ),
     search=SearchHints(typical=lambda a: (0.5,)),
     softens=True,
 )

@@ -9,6 +9,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Contact, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -38,7 +39,7 @@ MECHANISM = Mechanism(
             contact=Contact.SLIPS,
         ),
     ),
-    text=Text("Before it slides, the contact yields like a spring of {stiffness_n_m_rad}."),
+    text=Text("Before it slides, the contact yields like a spring of {stiffness_n_m_rad}.", Picture.FRICTION_LOOP),
     search=SearchHints(
         lambda s: [(s.coulomb * s.ratio / d,) for d in (0.3e-6, 1e-6, 4e-6, 16e-6)],
         lambda a: (a.friction * a.ratio / 5e-6,),

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 
@@ -54,7 +55,7 @@ MECHANISM = Mechanism(
     ),
     variants=(Variant(Stage.TABLE_READING, _interpolated_reading),),
     text=Text(
-        "The linear encoder errs by {amplitude_m} within each signal period of {period_m}.", Picture.SIGNAL_PERIOD
+        "The linear encoder errs by {amplitude_m} within each signal period of {period_m}.", Picture.SCALE_READING
     ),
     search=SearchHints(_starts, lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0), needs_table=True),
     valid=_valid,

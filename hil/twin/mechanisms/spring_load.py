@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.mechanisms.constant_load import MECHANISM as LOAD
 from hil.twin.parameter import ANYWHERE, Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts, Scene
 
 
@@ -41,7 +42,7 @@ MECHANISM = Mechanism(
         Parameter("rest_position_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _pull_to_rest),),
-    text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.POSITION),
+    text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.FORCE_OVER_TRAVEL),
     search=SearchHints(_starts, lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     valid=_valid,
     beyond=lambda values, a: (LOAD.id, (-values[0] * values[1] * a.ratio,)),

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.mechanism import Block, Mechanism, Picture, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.frequency import modal_damping
@@ -148,7 +149,7 @@ MECHANISM = Mechanism(
     ),
     text=Text(
         "A structure of {mass_ratio} of the table's mass sways at {frequency_hz}, damped by {damping_ratio}.",
-        Picture.SPECTRUM,
+        Picture.RESPONSE,
     ),
     search=SearchHints(
         lambda s: [(f, 0.03, 0.15) for f in np.geomspace(12.0, 240.0, 13)],

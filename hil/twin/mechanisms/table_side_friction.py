@@ -4,6 +4,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -19,6 +20,6 @@ MECHANISM = Mechanism(
     source="Altintas, Verl, Brecher, Uriarte and Pritschow, Machine tool feed drives, CIRP Annals 60 (2011) 779",
     parameters=(Parameter("share", Dimension.RATIO, 0.0, 1.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.TABLE_SHARE, _share_on_table),),
-    text=Text("A share of {share} of the friction acts on the table, not on the motor."),
+    text=Text("A share of {share} of the friction acts on the table, not on the motor.", Picture.LOST_MOTION),
     search=SearchHints(lambda s: [(0.2,), (0.6,)], lambda a: (0.3,), proportional=False, needs_table=True),
 )

@@ -4,6 +4,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -22,6 +23,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TABLE_VISCOUS_SHARE, _more_on_table),),
     text=Text(
         "The share of the viscous friction on the motor is {share} less than that of Coulomb friction.",
+        Picture.LOST_MOTION,
         reversed="The share of the viscous friction on the table is {share} less than that of Coulomb friction.",
     ),
     search=SearchHints(lambda s: [(0.1,), (-0.1,)], lambda a: (0.5,), needs_table=True),

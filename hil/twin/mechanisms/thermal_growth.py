@@ -7,6 +7,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 _FASTEST_S = 1.5  # near the lower bound: what grows at once is another lead, or another ratio
@@ -36,7 +37,10 @@ MECHANISM = Mechanism(
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(Variant(Stage.TRANSMISSION, _grown_lead),),
-    text=Text("The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}."),
+    text=Text(
+        "The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}.",
+        Picture.GROWTH,
+    ),
     search=SearchHints(
         lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],
         lambda a: (50e-6, 1800.0),

@@ -4,8 +4,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -27,7 +28,7 @@ MECHANISM = Mechanism(
     parameters=(Parameter("coefficient_1_n2_m2", Dimension.INVERSE_TORQUE_SQUARED, 0.0, 1.0, role=Role.STRENGTH),),
     variants=(Variant(Stage.TORQUE, _saturating_torque_constant),),
     text=Text(
-        "The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.", Picture.DRIVE_LAW
+        "The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.", Picture.CHARACTERISTIC
     ),
     search=SearchHints(lambda s: [(0.02 / s.peak_torque**2,)], lambda a: (0.1 / (3.0 * a.rated_torque) ** 2,)),
 )

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 
@@ -40,7 +41,7 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _gate, "measured gate"),
         Variant(Stage.TORQUE, _gate, "hidden gate"),
     ),
-    text=Text("The drive gives no torque for commands below {half_width_n_m}.", Picture.DRIVE_LAW),
+    text=Text("The drive gives no torque for commands below {half_width_n_m}.", Picture.CHARACTERISTIC),
     search=SearchHints(
         lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)], lambda a: (0.05 * a.friction,), proportional=False
     ),

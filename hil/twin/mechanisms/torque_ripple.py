@@ -4,8 +4,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -25,7 +26,7 @@ MECHANISM = Mechanism(
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TORQUE, _rippling_torque),),
-    text=Text("The torque per ampere varies by a share of {fraction}, {wave}.", Picture.MOTOR_ANGLE_PER_TORQUE),
+    text=Text("The torque per ampere varies by a share of {fraction}, {wave}.", Picture.RIPPLE),
     search=SearchHints(
         lambda s: [(0.01, order, 0.0) for order in dict.fromkeys((*s.ripple_orders, *s.orders))],
         lambda a: (0.02, 6.0, 0.0),

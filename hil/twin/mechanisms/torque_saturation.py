@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 
@@ -36,7 +37,7 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _limited_torque, "measured"),
         Variant(Stage.TORQUE, _limited_torque, "hidden"),
     ),
-    text=Text("The drive gives at most {limit_n_m}, less than the controller may command.", Picture.DRIVE_LAW),
+    text=Text("The drive gives at most {limit_n_m}, less than the controller may command.", Picture.CHARACTERISTIC),
     search=SearchHints(
         lambda s: [(f * s.peak_torque,) for f in (0.999, 0.95, 0.85, 0.7)],
         lambda a: (2.5 * a.rated_torque,),

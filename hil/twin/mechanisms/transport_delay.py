@@ -4,8 +4,9 @@ import math
 
 from numba import njit
 
-from hil.twin.mechanism import Block, Mechanism, Moment, Picture, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 _OLDEST = 14  # age in ticks of the oldest command kept: 12 ticks of delay, a fraction, and its step
 _MOST_S = 0.012
@@ -42,7 +43,7 @@ MECHANISM = Mechanism(
         Variant(Stage.CURRENT, _delayed_command, "measured"),
         Variant(Stage.TORQUE, _delayed_command, "hidden"),
     ),
-    text=Text("The torque command acts {delay_s} later than the controller believes.", Picture.DRIVE_LAW),
+    text=Text("The torque command acts {delay_s} later than the controller believes.", Picture.DELAY),
     search=SearchHints(
         lambda s: [(delay_s,) for delay_s in (1.5e-4, 7e-4, *s.delays_s(0.0, _MOST_S))],
         lambda a: (5e-4,),

@@ -4,6 +4,7 @@ from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.picture import Picture
 
 
 @njit
@@ -19,6 +20,6 @@ MECHANISM = Mechanism(
     source="Brown, Schneider and Mulligan, IEEE Trans. Industrial Electronics 39 (1992) 11, filtered differences",
     parameters=(Parameter("time_constant_s", Dimension.TIME, 1e-5, 0.05, role=Role.STRENGTH),),
     variants=(Variant(Stage.VELOCITY_FILTER, _time_constant),),
-    text=Text("The controller filters its velocity feedback with a time constant of {time_constant_s}."),
+    text=Text("The controller filters its velocity feedback with a time constant of {time_constant_s}.", Picture.DELAY),
     search=SearchHints(lambda s: [(2e-4,), (1e-3,)], lambda a: (5e-4,), proportional=False),
 )

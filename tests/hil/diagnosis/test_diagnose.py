@@ -61,7 +61,7 @@ def test_the_part_that_is_explained_is_told(tmp_path: Path) -> None:
     assert part.effect == "cogging_torque"
     assert part.parameters["amplitude_n_m"].value == pytest.approx(AMPLITUDE_N_M, rel=0.02)
     assert 0.02 < result.unexplained.share < 0.5
-    assert "table_position_m" in result.unexplained.description
+    assert "table position" in result.unexplained.description
     write_diagnosis(found, tmp_path)
     assert "Explains a part: cogging torque" in (tmp_path / "report.html").read_text()
     assert [entry.effect for entry in load_bench(tmp_path / "bench.diagnosed.yaml").mechanisms] == ["cogging_torque"]

@@ -4,10 +4,10 @@ import pytest
 from example_result import EXAMPLE
 
 from hil.bench.bench_file import load_bench
-from hil.diagnosis.result import Location, Result
-from hil.diagnosis.statement import statement
+from hil.diagnosis.result import AT_FLOOR, Location, Result
+from hil.diagnosis.statement import explained, statement
 from hil.diagnosis.turning import of_load
-from hil.diagnosis.wording import sentence, where
+from hil.diagnosis.wording import sentence, spoken, where
 from hil.identification.terms import Term
 from hil.twin.library import LIBRARY
 
@@ -90,3 +90,57 @@ def test_a_change_is_a_share_only_where_a_ratio_says_something(
     correction = {"nominal": nominal, "value": value, "std": 1e-6, "unit": unit}
     result = Result.model_validate(EXAMPLE | {"verdict": "parameter_error", "parameter_corrections": {"x": correction}})
     assert statement(result) == f"No physics is missing; parameters of the bench file are wrong: {said}."
+
+
+def finding(effect: str, confidence: float, sentence: str) -> dict[str, object]:
+    return EXAMPLE["missing"][0] | {"effect": effect, "confidence": confidence, "sentence": sentence}
+
+
+FLOOR = {"description": AT_FLOOR, "share": 0.0}
+
+
+def test_the_statement_says_what_is_sure_and_mentions_what_may_be() -> None:
+    found = (
+        finding("cogging_torque", 0.95, "The motor cogs."),
+        finding("torque_ripple", 0.3, "The torque ripples."),
+        finding("end_stop", 0.1, "There is a stop."),
+        finding("gravity_torque", 0.01, "Gravity pulls."),
+    )
+    result = Result.model_validate(EXAMPLE | {"missing": found, "unexplained": FLOOR})
+    assert statement(result) == (
+        "Missing physics: The motor cogs. Perhaps also torque ripple (30.0 %) and end stop (10.0 %). "
+        "With it the residual of the torque on held-out recordings falls from 80.0 mN m rms to its noise."
+    )
+    assert explained(result)
+
+
+def test_a_residual_above_its_noise_is_told_with_it_and_is_not_explained() -> None:
+    figures = {"before_rms": 0.08, "after_rms": 0.03, "noise_floor_rms": 0.01, "owner_rms": 0.2}
+    fit = {"torque_n_m": EXAMPLE["fit"]["torque_n_m"] | {"train": figures, "validate": figures}}
+    left = {"description": "Residuals above the noise (rms): torque 3.00 times.", "share": 0.1}
+    result = Result.model_validate(EXAMPLE | {"fit": fit, "unexplained": left})
+    assert statement(result).endswith(
+        "falls from 80.0 mN m to 30.0 mN m rms; its noise is 10.0 mN m. "
+        "Not explained: residuals above the noise (rms): torque 3.00 times."
+    )
+    assert not explained(result)
+
+
+def test_a_finding_that_is_not_likely_is_called_doubtful() -> None:
+    result = Result.model_validate(EXAMPLE | {"missing": (finding("end_stop", 0.2, "There is a stop."),)})
+    assert statement(result).startswith(
+        "Missing physics, doubtful by its confidence (20.0 %): There is a stop. With it"
+    )
+
+
+@pytest.mark.parametrize(
+    ("channel", "words"),
+    [
+        ("motor_position_rad", "motor position"),
+        ("torque_command_n_m", "torque command"),
+        ("table_position_m", "table position"),
+        ("force_n", "force"),
+    ],
+)
+def test_a_channel_is_named_without_its_unit(channel: str, words: str) -> None:
+    assert spoken(channel) == words

@@ -1,0 +1,82 @@
+"""Section of a report: each finding with its picture, its values and its alternatives."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from hil.diagnosis.diagnosis import Diagnosis
+from hil.diagnosis.pictures.findings import finding_figure, term_of
+from hil.diagnosis.result import Finding, Value
+from hil.diagnosis.statement import MENTIONED
+from hil.diagnosis.turning import of_load
+from hil.diagnosis.wording import label, title, titles
+from hil.figures.drawing import save
+from hil.quantities import percent, reading_unit, with_error
+from hil.report.page import Page
+from hil.twin.library import BY_ID
+
+
+def findings_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
+    """Add the findings with their pictures; those that are hardly there by their confidence in one table."""
+    findings = diagnosis.result.findings
+    shown = [at for at, one in enumerate(findings) if one.confidence >= MENTIONED] or list(range(len(findings)))
+    for index in shown:
+        _finding(page, diagnosis, index, folder)
+    _hardly(page, [one for at, one in enumerate(findings) if at not in shown])
+
+
+def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None:
+    finding, term = diagnosis.result.findings[index], term_of(diagnosis, index)
+    mechanism = BY_ID[finding.effect]
+    name = label(term, diagnosis.given_bench)
+    name = f"Explains a part: {name}" if diagnosis.result.partial else f"{name[:1].upper()}{name[1:]}"
+    turns = diagnosis.given_bench.axis.turns
+    page.heading(f"{index + 1}. {name}: {of_load(mechanism.element_of(term.variant), turns)}")
+    figure, caption = finding_figure(diagnosis, term)
+    again = f"_{term.slot + 1}" if term.slot else ""
+    page.picture(save(figure, folder / f"{term.effect}{again}.png"), of_load(caption, turns))
+    sure = f"{100.0 * finding.confidence:.0f} %" if finding.confidence < 0.99 else "above 99 %"
+    page.text(f"{finding.sentence} Confidence {sure}: {finding.needed}.")
+    page.text(f"{mechanism.equation} ({mechanism.source})")
+    if finding.form:
+        page.text(f"Reported as part of this curve, because it corrects the curve's form only slightly: {finding.form}")
+    page.table(
+        ("parameter", "value", "standard error", "unit"),
+        [(name, *_cells(entry, scaled=not finding.windows)) for name, entry in finding.parameters.items()],
+        left=(0, 3),
+    )
+    if len(finding.windows) > 1:
+        unit = finding.windows[0].strength.unit
+        page.table(("recording", "from [s]", "to [s]", f"strength [{unit}]"), _windows(finding), left=range(4))
+    if finding.equivalents:
+        page.text(f"This motion cannot distinguish it from: {titles(finding.equivalents)}.")
+    if finding.rivals:
+        page.table(
+            ("alternative", "compared with this finding"),
+            [(title(rival.effect), rival.evidence) for rival in finding.rivals],
+            left=(0, 1),
+        )
+
+
+def _hardly(page: Page, findings: Sequence[Finding]) -> None:
+    """Findings that are hardly there by their confidence."""
+    if findings:
+        page.heading("What is hardly there")
+        page.table(
+            ("named by the search", "confidence", "evidence"),
+            [(one.sentence, percent(one.confidence), one.needed) for one in findings],
+            left=(0, 2),
+        )
+
+
+def _windows(finding: Finding) -> list[tuple[str, ...]]:
+    """Windows of an event, with standard errors."""
+    return [
+        (one.recording, *(" ± ".join(with_error(e.value, e.std)) for e in (one.start, one.end, one.strength)))
+        for one in finding.windows
+    ]
+
+
+def _cells(entry: Value, scaled: bool = True) -> tuple[str, ...]:
+    """Cells of a value, its standard error, and the unit in which both are shown: the SI unit if not `scaled`."""
+    factor, unit = reading_unit(entry.unit, entry.value) if scaled else (1.0, entry.unit)
+    return *with_error(entry.value * factor, entry.std * factor), unit

@@ -1,0 +1,98 @@
+"""Sections of a report: what is left before and after, and the parameters of the bench."""
+
+from pathlib import Path
+
+from hil.diagnosis.diagnosis import Diagnosis
+from hil.diagnosis.pictures.location import residual_panels
+from hil.diagnosis.result import FitFigures, Result, TorqueLeft
+from hil.diagnosis.wording import label, spoken, title
+from hil.figures.drawing import save
+from hil.quantities import digits, percent, quantity, reading_unit
+from hil.report import plots
+from hil.report.compare_report import fitted_cells
+from hil.report.page import Page
+
+_FIT_HEADERS = (
+    "channel",
+    "how",
+    "recordings",
+    "bench file",
+    "before (refitted)",
+    "after",
+    "noise",
+    "after / noise",
+)
+
+
+def fit_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
+    result = diagnosis.result
+    page.heading("Does modelling it help?")
+    page.table(
+        _FIT_HEADERS,
+        [
+            (spoken(name), title(entry.mode), what, *_figures(found, entry.unit))
+            for name, entry in result.fit.items()
+            for what, found in (("training", entry.train), ("held out", entry.validate_))
+            if found is not None
+        ],
+        left=(0, 1, 2),
+    )
+    run = (*diagnosis.held_out.runs, *diagnosis.train.runs)[0]
+    save(diagnosis.plot("residuals"), folder / "residuals.png")
+    page.text(f"Measured - twin on {run.name}, before and after; the band is the noise floor (residuals.png).")
+    page.plot(plots.over_time(run.time_s, residual_panels(diagnosis, run)))
+    if result.torque_left:
+        page.text(torque_line(result.torque_left))
+    proof = diagnosis.reported.judged.tested.proof
+    kept, dropped = proof.ablations, proof.dropped
+    if not dropped and not (result.findings and len(kept) > 1):
+        return
+    page.text("Growth of the residual energy if one term is left out and everything else is refitted.")
+    page.table(
+        ("without", "training", "held out", "kept"),
+        [
+            (
+                label(ablation.term, diagnosis.given_bench),
+                f"{digits(ablation.train)} ×",
+                f"{digits(ablation.held_out)} ×" if ablation.held_out is not None else "–",
+                answer,
+            )
+            for answer, found in (("yes", kept), ("no", dropped))
+            for ablation in found
+        ],
+        mark=3,
+    )
+
+
+def torque_line(left: TorqueLeft) -> str:
+    """One line: the torque left on held-out motion by each twin, and by the plain model."""
+    shares = {
+        "bench file": left.owner,
+        "refitted": left.refitted,
+        "after": left.final,
+        "plain least squares": left.plain,
+    }
+    given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
+    return f"Torque left on held-out motion, of the torque's standard deviation: {given}."
+
+
+def _figures(found: FitFigures, unit: str) -> list[str]:
+    """Cells of a channel's rms values, and the last over the noise floor."""
+    values = (found.owner_rms, found.before_rms, found.after_rms, found.noise_floor_rms)
+    over_floor = digits(found.after_rms / found.noise_floor_rms) if found.noise_floor_rms > 0.0 else "–"
+    return [*("unstable" if value is None else quantity(value, unit) for value in values), over_floor]
+
+
+def corrections_section(page: Page, result: Result) -> None:
+    rows = []
+    for name, one in result.parameter_corrections.items():
+        factor, unit = reading_unit(one.unit, max(abs(one.nominal), abs(one.value)))
+        values = (factor * value for value in (one.nominal, one.value, one.std))
+        rows.append((name, unit, *fitted_cells(*values)))
+    if not rows and not result.not_identifiable:
+        return
+    page.heading("Parameters of the bench")
+    if result.not_identifiable:
+        page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
+    if rows:
+        page.table(("parameter", "unit", "bench file", "fitted", "standard error", "change"), rows, left=(0, 1))

@@ -1,5 +1,7 @@
 """hil validate."""
 
+import json
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,14 +10,34 @@ import typer
 from hil.report.console import err, out
 
 
+class Format(StrEnum):
+    """A file format."""
+
+    BENCH = "bench"
+    PROFILE = "profile"
+    MAP = "map"
+
+
 def validate(
-    files: Annotated[list[Path], typer.Argument(help="Bench, profile or map files (YAML).", show_default=False)],
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Bench, profile or map files (YAML).", show_default=False)
+    ] = None,
+    schema: Annotated[
+        Format | None, typer.Option(help="Print the JSON Schema of this format, for editors.", show_default=False)
+    ] = None,
 ) -> None:
     """Check bench, profile and map files, and the EDS files of a bench. Every error names file, line and field."""
     from hil.errors import InputError
 
+    if (schema is None) == (not files):
+        raise InputError("FILES: give files to check, or --schema and a format, not both")
+    if schema is not None:
+        from hil.manual.schemas import json_schema
+
+        out.print(json.dumps(json_schema(schema), indent=1, ensure_ascii=False))
+        return
     problems = []
-    for path in files:
+    for path in files or ():
         try:
             out.print(f"{path}: {_checked(path)}")
         except InputError as error:

@@ -95,7 +95,7 @@ class Encoders(BenchSection):
 class Bench(BenchSection):
     """A bench file."""
 
-    schema_version: Literal[1] = Field(1, description="1")
+    schema_version: Literal[1] = Field(1, description="version of the format")
     name: str = Field("", description="name of the bench; absent: that of the file")
     description: str = Field("", description="what the bench is")
     axis: Axis = Field(description="masses, stiffness and friction, as the owner believes them")

@@ -1,6 +1,5 @@
 """hil validate."""
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -32,9 +31,9 @@ def validate(
     if (schema is None) == (not files):
         raise InputError("FILES: give files to check, or --schema and a format, not both")
     if schema is not None:
-        from hil.manual.schemas import json_schema
+        from hil.manual.schemas import schema_text
 
-        out.print(json.dumps(json_schema(schema), indent=1, ensure_ascii=False))
+        out.print(schema_text(schema), end="")
         return
     problems = []
     for path in files or ():

@@ -61,7 +61,10 @@ def sections(model: type[BaseModel]) -> list[Section]:
         seen.add(name)
         kind = next((f"{key}: {part['const']}" for key, part in node["properties"].items() if _names_kind(part)), "")
         required = node.get("required", ())
-        keys = tuple(_key(name, key, part, key in required, schema) for key, part in node["properties"].items())
+        parts = sorted(
+            node["properties"].items(), key=lambda item: not _names_kind(item[1])
+        )  # what tells the kind first
+        keys = tuple(_key(name, key, part, key in required, schema) for key, part in parts)
         found.append(Section(path, kind, node.get("description", "").split("\n\n")[0].replace("\n", " "), keys))
         for key, part in node["properties"].items():
             for inner, step in _mappings(part, schema):

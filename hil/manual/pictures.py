@@ -22,10 +22,11 @@ from hil.motion.trajectory import plan
 from hil.quantities import reading_unit
 from hil.twin.library import LIBRARY
 from hil.twin.mechanism import Mechanism
+from hil.twin.parameter import Dimension
 from hil.twin.physics import Active
 from hil.twin.scene import AxisFacts
 
-TIMES = 3.0  # the strength that an engineer would call a defect
+TIMES = 3.0  # the strength that an engineer would call a defect; not of a time, which makes the loops unstable
 SETTLED_S = 0.3  # before it, the loops answer to the start
 # values of a motion of 6 s over 100 mm (turning: 4 rad) with up to 5 N m, where typical ones lie outside of it
 _WITHIN = {
@@ -62,7 +63,8 @@ def change_by(mechanism: Mechanism) -> tuple[Bench, Change]:
     )
     values = dict(zip(mechanism.names, mechanism.complete(mechanism.typical_values(facts)), strict=True))
     strength = mechanism.parameters[mechanism.strength]
-    values[strength.name] = min(TIMES * values[strength.name], strength.high)
+    if strength.dimension is not Dimension.TIME:
+        values[strength.name] = min(TIMES * values[strength.name], strength.high)
     values |= _WITHIN.get(mechanism.id, {})
     twin = bench.twin()
     without, acting = (

@@ -28,7 +28,8 @@ _INTRODUCED = {
 def keys(kind: str) -> str:
     """All keys of a file format with unit, default, example and meaning."""
     text = [_INTRODUCED[kind]]
-    text += ["", f"`hil validate --schema {kind}` prints the JSON Schema of this format for your editor."]
+    text += ["", "A key without a default may be absent. `–`: a number without a unit.", ""]
+    text += [f"`hil validate --schema {kind}` prints the JSON Schema of this format for your editor."]
     for section in sections(FORMATS[kind]):
         text += [
             "",

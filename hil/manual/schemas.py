@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from hil.bench.control_section import UNKNOWN
@@ -14,6 +15,11 @@ def json_schema(kind: str) -> dict[str, Any]:
     if kind == "bench":
         _allow_short_forms(schema)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def schema_text(kind: str) -> str:
+    """JSON Schema of a format, as `hil validate --schema` prints it."""
+    return json.dumps(json_schema(kind), indent=1, ensure_ascii=False) + "\n"
 
 
 def _allow_short_forms(schema: dict[str, Any]) -> None:

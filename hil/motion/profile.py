@@ -41,7 +41,7 @@ class Run(NamedTuple):
 class Profile(Part):
     """A trajectory profile: limits and the segments that run one after the other, each from rest to rest."""
 
-    schema_version: Literal[1] = Field(description="1")
+    schema_version: Literal[1] = Field(description="version of the format")
     description: str = Field("", description="what the profile is for")
     limits: Limits = Field(description="largest magnitudes of the set-points")
     start_m: Position = Field(0.0, description="where the profile starts [m]")

@@ -15,7 +15,7 @@ from hil.cli import app
 from hil.manual.pictures import draw_mechanisms
 from hil.manual.topics import GUIDE, REFERENCES, reference_page
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 BESIDE = ["README.md", "SAFETY.md", "PROOF.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE"]
 PICTURES = Path(tempfile.mkdtemp(prefix="hil-manual-"))
 
@@ -26,9 +26,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Overview": "README.md"},
         {"Guide": [f"docs/guide/{topic}.md" for topic in GUIDE]},
         {"Reference": [f"docs/reference/{topic}.md" for topic in REFERENCES]},
-        {
-            "Hardware": ["docs/hardware.md", "SAFETY.md", "docs/supervision.md", "docs/service.md"],
-        },
+        {"Hardware": ["docs/hardware.md", "SAFETY.md", "docs/supervision.md", "docs/service.md"]},
         {"Recordings and Python": ["docs/recordings.md", "docs/api.md"]},
         {
             "Measured": [
@@ -49,7 +47,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     documents = [ROOT / name for name in BESIDE]
     for file in [one for one in files if one.src_dir == config.docs_dir]:
         files.remove(file)
-        if file.src_uri != "site.py":
+        if not file.src_uri.endswith(".py"):
             documents.append(ROOT / "docs" / file.src_uri)
     for path in documents:
         files.append(File.generated(config, path.relative_to(ROOT).as_posix(), abs_src_path=str(path)))

@@ -40,7 +40,7 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Section:
+class KeySection:
     """A mapping of a file: its place, such as `drive.encoder`, what distinguishes it from others there, its keys."""
 
     path: str
@@ -49,10 +49,10 @@ class Section:
     keys: tuple[Key, ...]
 
 
-def sections(model: type[BaseModel]) -> list[Section]:
+def sections(model: type[BaseModel]) -> list[KeySection]:
     """All sections of a format, from the top of the file downwards; one that stands at several places, at its first."""
     schema = model.model_json_schema()
-    found = list[Section]()
+    found = list[KeySection]()
     seen = set[str]()
 
     def visit(name: str, node: dict[str, Any], path: str) -> None:
@@ -65,7 +65,7 @@ def sections(model: type[BaseModel]) -> list[Section]:
             node["properties"].items(), key=lambda item: not _names_kind(item[1])
         )  # what tells the kind first
         keys = tuple(_key(name, key, part, key in required, schema) for key, part in parts)
-        found.append(Section(path, kind, node.get("description", "").split("\n\n")[0].replace("\n", " "), keys))
+        found.append(KeySection(path, kind, node.get("description", "").split("\n\n")[0].replace("\n", " "), keys))
         for key, part in node["properties"].items():
             for inner, step in _mappings(part, schema):
                 visit(inner, schema["$defs"][inner], f"{path}.{key}{step}".lstrip("."))

@@ -27,6 +27,7 @@ from hil.twin.physics import Active
 from hil.twin.scene import AxisFacts
 
 TIMES = 3.0  # the strength that an engineer would call a defect; not of a time, which makes the loops unstable
+WAVES = 4.0  # of a periodic mechanism over the position: more would be a black area
 SETTLED_S = 0.3  # before it, the loops answer to the start
 # values of a motion of 6 s over 100 mm (turning: 4 rad) with up to 5 N m, where typical ones lie outside of it
 _WITHIN = {
@@ -39,16 +40,17 @@ _WITHIN = {
 }
 
 
-class Change(NamedTuple):
-    """Time, table position, and what a mechanism changes in torque and table position, each (n,)."""
+class MechanismChange(NamedTuple):
+    """Time, table position, and what a mechanism changes in torque and table position, each (n,); its wavelength."""
 
     time_s: FloatArray
     position_m: FloatArray
     torque: FloatArray
     table: FloatArray
+    wavelength_m: float  # 0 without one
 
 
-def change_by(mechanism: Mechanism) -> tuple[Bench, Change]:
+def change_by(mechanism: Mechanism) -> tuple[Bench, MechanismChange]:
     """The axis of an example on which the mechanism can act, and what it changes there."""
     kind = "turning" if mechanism.turning else "screw"
     bench = load_bench(EXAMPLES / f"bench-{kind}-simple.yaml")
@@ -72,11 +74,12 @@ def change_by(mechanism: Mechanism) -> tuple[Bench, Change]:
         for active in ((), (Active(mechanism.id, tuple(values.values())),))
     )
     rows = slice(round(SETTLED_S / bench.period_s), None)
-    return bench, Change(
+    return bench, MechanismChange(
         trajectory.time_s[rows],
         trajectory.position_m[rows],
         (acting.torque - without.torque)[rows],
         (acting.table_position_m - without.table_position_m)[rows],
+        mechanism.wavelength_m(tuple(values.values()), facts),
     )
 
 
@@ -94,6 +97,9 @@ def draw(mechanism: Mechanism) -> Figure:
         for column, along in enumerate((change.time_s, change.position_m * travel.factor)):
             axes[row, column].plot(along, values * factor, color=DEVIATION, linewidth=0.9)
             style_axis(axes[row, column], f"{name} [{shown}]" if column == 0 else "")
+    middle, waves = 0.5 * float(change.position_m.max()), WAVES * change.wavelength_m
+    if 0.0 < waves < middle:
+        axes[1, 1].set_xlim(middle * travel.factor, (middle + waves) * travel.factor)
     axes[1, 0].set_xlabel("time [s]")
     axes[1, 1].set_xlabel(f"position set-point [{travel.unit}]")
     return figure

@@ -10,7 +10,7 @@ from typing import Any
 
 from drivers.sim.effects import EFFECTS, ParameterRange
 from hil.channels import CHANNELS
-from hil.manual.keys import FORMATS, Key, Section, sections
+from hil.manual.keys import FORMATS, Key, KeySection, sections
 from hil.twin.library import LIBRARY
 from hil.twin.mechanism import Mechanism
 from hil.twin.parameter import ANYWHERE, Parameter
@@ -45,7 +45,7 @@ def keys(kind: str) -> str:
 _KEY_COLUMNS = ("key", "unit", "default", "example", "meaning")
 
 
-def _heading(section: Section) -> str:
+def _heading(section: KeySection) -> str:
     place = f"`{section.path}`" if section.path else "The file"
     return f"{place} with `{section.kind}`" if section.kind else place
 
@@ -90,11 +90,13 @@ def _argument_row(parameter: Any) -> tuple[str, ...]:
 def _option_row(parameter: Any) -> tuple[str, ...]:
     flag, default = parameter.is_flag, parameter.default
     name = " / ".join([*parameter.opts, *parameter.secondary_opts])
-    shown = flag or default is None or callable(default) or default == []
+    if parameter.secondary_opts:
+        default = (parameter.opts if default else parameter.secondary_opts)[0]
+    hidden = (flag and not parameter.secondary_opts) or default is None or callable(default) or default == []
     named = name if flag else f"{name} {parameter.metavar or parameter.name.upper()}"
     return (
         _code(named),
-        "" if shown else _code(f"{default:g}" if isinstance(default, float) else str(default)),
+        "" if hidden else _code(f"{default:g}" if isinstance(default, float) else str(default)),
         (parameter.help or ""),
     )
 
@@ -117,6 +119,9 @@ def mechanisms(picture: Callable[[str], str] = lambda name: "") -> str:
     """All mechanisms with equation, source and parameters; `picture` gives the Markdown of the picture of an id."""
     text = ["The effects that a diagnosis can name and that a bench file may contain (`mechanisms`)."]
     text += ["Units are those of a rotary axis; a linear one has N for N m and m for rad.", ""]
+    if picture(LIBRARY[0].id):
+        text += ["A picture shows what a mechanism changes in closed loop on an axis that moves 100 mm there and back,"]
+        text += ["slowly and fast. Its strength is up to three times what an engineer would call a defect.", ""]
     contents = [(f"[{_name(one)}](#{one.id})", one.block.value.replace("_", " "), one.element) for one in LIBRARY]
     text += _table(("mechanism", "block", "part of the axis"), contents)
     for mechanism in LIBRARY:

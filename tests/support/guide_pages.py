@@ -41,7 +41,7 @@ def steps(topic: str) -> list[Step]:
 
 
 def prepared(folder: Path) -> Path:
-    """A folder with what a reader has: profiles, own recordings, and the files of all pages."""
+    """A folder with what a reader has: profiles (a link), own recordings, and the files of all pages."""
     (folder / "profiles").symlink_to(ROOT / "profiles")
     for topic in GUIDE:
         for step in steps(topic):

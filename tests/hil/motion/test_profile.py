@@ -58,8 +58,8 @@ def test_a_shipped_profile_loads_and_names_its_schema(path: Path) -> None:
 
 
 def test_the_published_schema_is_current() -> None:
-    assert (ROOT / "hil/profile.schema.json").read_text(encoding="utf-8") == schema_text("profile"), (
-        "run: hil validate --schema profile > hil/profile.schema.json"
+    assert (ROOT / "hil/motion/profile.schema.json").read_text(encoding="utf-8") == schema_text("profile"), (
+        "run: hil validate --schema profile > hil/motion/profile.schema.json"
     )
 
 

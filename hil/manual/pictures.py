@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
@@ -27,6 +28,7 @@ from hil.twin.physics import Active
 from hil.twin.scene import AxisFacts
 
 TIMES = 3.0  # the strength that an engineer would call a defect; not of a time, which makes the loops unstable
+ROUNDING = 1e-9  # N m, m, rad: less is no change
 WAVES = 4.0  # of a periodic mechanism over the position: more would be a black area
 SETTLED_S = 0.3  # before it, the loops answer to the start
 # values of a motion of 6 s over 100 mm (turning: 4 rad) with up to 5 N m, where typical ones lie outside of it
@@ -77,10 +79,14 @@ def change_by(mechanism: Mechanism) -> tuple[Bench, MechanismChange]:
     return bench, MechanismChange(
         trajectory.time_s[rows],
         trajectory.position_m[rows],
-        (acting.torque - without.torque)[rows],
-        (acting.table_position_m - without.table_position_m)[rows],
+        _without_rounding(acting.torque - without.torque)[rows],
+        _without_rounding(acting.table_position_m - without.table_position_m)[rows],
         mechanism.wavelength_m(tuple(values.values()), facts),
     )
+
+
+def _without_rounding(values: FloatArray) -> FloatArray:
+    return values if abs(values).max() > ROUNDING else np.zeros_like(values)
 
 
 def draw(mechanism: Mechanism) -> Figure:
@@ -89,15 +95,18 @@ def draw(mechanism: Mechanism) -> Figure:
     length = "rad" if bench.axis.turns else "m"
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     axes = figure.subplots(2, 2, sharey="row", sharex="col")
+    step_m = abs(np.gradient(change.position_m))  # rows further apart than an eighth of a wave do not show it
+    shown_rows = step_m < change.wavelength_m / 8.0 if change.wavelength_m else step_m >= 0.0
+    along_m = np.where(shown_rows, change.position_m, np.nan)
     travel = reading_unit(length, float(abs(change.position_m).max()))
     for row, (values, unit, name) in enumerate(
         ((change.torque, "N m", "change of\ntorque"), (change.table, length, "change of\ntable position"))
     ):
         factor, shown = reading_unit(unit, float(abs(values).max()))
-        for column, along in enumerate((change.time_s, change.position_m * travel.factor)):
+        for column, along in enumerate((change.time_s, along_m * travel.factor)):
             axes[row, column].plot(along, values * factor, color=DEVIATION, linewidth=0.9)
             style_axis(axes[row, column], f"{name} [{shown}]" if column == 0 else "")
-    middle, waves = 0.5 * float(change.position_m.max()), WAVES * change.wavelength_m
+    middle, waves = 0.502 * float(change.position_m.max()), WAVES * change.wavelength_m
     if 0.0 < waves < middle:
         axes[1, 1].set_xlim(middle * travel.factor, (middle + waves) * travel.factor)
     axes[1, 0].set_xlabel("time [s]")

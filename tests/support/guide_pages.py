@@ -47,11 +47,11 @@ def prepared(folder: Path) -> Path:
         for step in steps(topic):
             if step.name.endswith(".yaml"):
                 (folder / step.name).write_text(step.text)
-    columns = axis(2500)
-    time_s, angle, torque = columns["t"], columns["angle"], columns["torque"]
+    columns, rows = axis(4000), slice(0, 2500)
+    time_s, angle, torque = (columns[name][rows] for name in ("t", "angle", "torque"))
     header = "time [s],angle [rad],torque [Nm]"
     _write(folder / "my-axis.csv", header, time_s, angle, torque)
-    _write(folder / "my-axis-fast.csv", header, time_s[:2000], angle[500:], torque[500:])
+    _write(folder / "my-axis-fast.csv", header, time_s, columns["angle"][-2500:], columns["torque"][-2500:])
     both = "time [s],angle 1 [rad],torque 1 [Nm],angle 2 [rad],torque 2 [Nm]"
     _write(folder / "all-axes.csv", both, time_s, np.roll(angle, 300), np.roll(torque, 300), angle, torque)
     _write(folder / "no-time.csv", "angle [rad],torque [Nm]", angle, torque)

@@ -6,6 +6,7 @@
 # make fuzz, make fault-matrix: 20 000 damaged inputs; 10 000 runs with a fault (10 to 20 min each)
 # make mutation run the tests against mutants of the safety code, SAMPLE of each module (an hour)
 # make vm-test  boot a PREEMPT_RT kernel in a virtual machine and disturb the bench there (as root)
+# make docs     build the site of the manual in build/site, for reading without a server or a network
 # make test-long, make peers, make clean
 PYTHON ?= python3.11
 BIN := .venv/bin
@@ -15,7 +16,7 @@ SEED ?= 1
 # one folder holds the answers of one state of the code
 NET ?= runs/net-$(shell git rev-parse --short HEAD 2>/dev/null)
 
-.PHONY: all setup test test-long format net fuzz fault-matrix mutation vm-test peers clean
+.PHONY: all setup docs test test-long format net fuzz fault-matrix mutation vm-test peers clean
 
 all: setup
 	$(BIN)/hil demo
@@ -59,6 +60,11 @@ format: setup
 net: setup
 	$(BIN)/python tests/net/net.py $(NET)
 	$(BIN)/pytest -n 2 --dist loadfile -m net
+
+docs: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open build/site/index.html"
 
 # what hil bench and hil prove measure the project against; not needed to run it
 peers: setup

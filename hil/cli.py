@@ -23,6 +23,7 @@ from hil.commands.doctor import doctor
 from hil.commands.explain import explain
 from hil.commands.export import export
 from hil.commands.friction import friction
+from hil.commands.guide import guide
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.commands.install_service import install_service
@@ -63,6 +64,7 @@ def _options(
 
 # In the order of --help. A command's file imports nothing heavy at its top.
 COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
+    ("guide", guide),
     ("demo", demo),
     ("run", run),
     ("scope", scope),

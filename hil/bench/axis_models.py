@@ -12,12 +12,14 @@ from hil.errors import FieldError
 from hil.twin.physics import Physics
 from hil.twin.structure.chain import (
     LINEAR_LEAD_M,
-    RECONSTRUCTED_TABLE_1,
     Chain,
     one_mass,
     serial_chain,
     seven_dof,
     two_mass,
+)
+from hil.twin.structure.chain import (
+    RECONSTRUCTED_TABLE_1 as _TABLE_1,
 )
 
 
@@ -66,19 +68,23 @@ class SevenDofAxis(Screw):
     MASSES: ClassVar[tuple[str, ...]] = ("motor_inertia_kg_m2", "table_mass_kg")
     SPRINGS: ClassVar[tuple[str, ...]] = ("nut_support_stiffness_n_m", "coupling_stiffness_n_m_rad", "damping_ratio")
     model: Literal["seven_dof"] = "seven_dof"
-    lead_m: Lead = RECONSTRUCTED_TABLE_1.lead_m
-    motor_inertia_kg_m2: Positive = RECONSTRUCTED_TABLE_1.motor_inertia_kg_m2
-    table_mass_kg: Positive = RECONSTRUCTED_TABLE_1.table_mass_kg
-    coupling_stiffness_n_m_rad: Positive = RECONSTRUCTED_TABLE_1.coupling_stiffness_n_m_rad
-    nut_stiffness_n_m: Positive = RECONSTRUCTED_TABLE_1.nut_stiffness_n_m
-    nut_support_stiffness_n_m: Positive = RECONSTRUCTED_TABLE_1.nut_support_stiffness_n_m
+    lead_m: Lead = Field(_TABLE_1.lead_m, description="travel of the table per motor revolution [m]")
+    motor_inertia_kg_m2: Positive = Field(_TABLE_1.motor_inertia_kg_m2, description="rotor of the motor")
+    table_mass_kg: Positive = Field(_TABLE_1.table_mass_kg, description="table with its load")
+    coupling_stiffness_n_m_rad: Positive = Field(
+        _TABLE_1.coupling_stiffness_n_m_rad, description="coupling between motor and screw"
+    )
+    nut_stiffness_n_m: Positive = Field(_TABLE_1.nut_stiffness_n_m, description="contact of nut and screw")
+    nut_support_stiffness_n_m: Positive = Field(
+        _TABLE_1.nut_support_stiffness_n_m, description="support of the nut at the table"
+    )
     nut_position_m: float | None = Field(None, description="nut from the front end of its travel [m]")
     damping_ratio: Damping = 0.03
 
     def chain(self) -> Chain:
         """The 7-dof chain with the nut at its position."""
-        given = self.model_dump(include=set(vars(RECONSTRUCTED_TABLE_1)))
-        parameters = replace(RECONSTRUCTED_TABLE_1, **given)
+        given = self.model_dump(include=set(vars(_TABLE_1)))
+        parameters = replace(_TABLE_1, **given)
         return seven_dof(parameters, self.damping_ratio, self.nut_position_m)
 
 

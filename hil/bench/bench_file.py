@@ -30,9 +30,9 @@ Resolution = Annotated[float, Field(gt=0.0, le=1e-3, allow_inf_nan=False, descri
 class MechanismEntry(BenchSection):
     """A mechanism that the twin of this bench contains."""
 
-    effect: str
-    variant: str = ""
-    parameters: dict[str, float]
+    effect: str = Field(description="id of a mechanism, as the reference of mechanisms lists them")
+    variant: str = Field("", description="its form; absent: the first one")
+    parameters: dict[str, float] = Field(description="name -> value in SI")
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -72,37 +72,40 @@ class MechanismEntry(BenchSection):
 class MotorEncoder(BenchSection):
     """Motor encoder."""
 
-    counts_per_rev: Annotated[int, Field(gt=0, lt=2**32)] = 2**20  # UNSIGNED32 in CiA 402, object 0x608F
+    # UNSIGNED32 in CiA 402, object 0x608F
+    counts_per_rev: Annotated[int, Field(gt=0, lt=2**32, description="counts per revolution of the motor")] = 2**20
     resolution_m: Annotated[float | None, Field(gt=0.0, description="count of a linear axis [m]")] = None
-    direction: Literal[1, -1] = 1
+    direction: Literal[1, -1] = Field(1, description="-1: it counts down while the table moves away from home")
 
 
 class TableEncoder(BenchSection):
     """Linear encoder at the table."""
 
     resolution_m: Resolution = 0.5e-6
-    direction: Literal[1, -1] = 1
+    direction: Literal[1, -1] = Field(1, description="-1: it counts down while the table moves away from home")
 
 
 class Encoders(BenchSection):
     """Encoders of the axis; `table: null` where there is none."""
 
-    motor: MotorEncoder = MotorEncoder()
-    table: TableEncoder | None = TableEncoder()
+    motor: MotorEncoder = Field(MotorEncoder(), description="encoder of the motor")
+    table: TableEncoder | None = Field(TableEncoder(), description="encoder of the table; null: there is none")
 
 
 class Bench(BenchSection):
     """A bench file."""
 
-    schema_version: Literal[1] = 1
-    name: str = ""
-    description: str = ""
-    axis: Axis
-    control: ControlSection = UnknownControl(law="unknown")
-    encoders: Encoders = Encoders()
-    mechanisms: tuple[MechanismEntry, ...] = ()
-    drive: DriveSection | None = None
-    simulation: SimulationSection | None = None
+    schema_version: Literal[1] = Field(1, description="version of the format")
+    name: str = Field("", description="name of the bench; absent: that of the file")
+    description: str = Field("", description="what the bench is")
+    axis: Axis = Field(description="masses, stiffness and friction, as the owner believes them")
+    control: ControlSection = Field(
+        UnknownControl(law="unknown"), description="the control law and its gains; absent or unknown: it is not judged"
+    )
+    encoders: Encoders = Field(Encoders(), description="resolution and direction of the encoders")
+    mechanisms: tuple[MechanismEntry, ...] = Field((), description="mechanisms that the twin of this bench contains")
+    drive: DriveSection | None = Field(None, description="bus, drive and supervision; absent: recordings only")
+    simulation: SimulationSection | None = Field(None, description="present: the devices are simulated")
 
     @model_validator(mode="before")
     @classmethod

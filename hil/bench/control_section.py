@@ -16,7 +16,7 @@ _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
 UNKNOWN = "unknown"
 
 # a period in milliseconds is refused
-Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="[s]")]
+Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="period of the loop [s]")]
 
 
 class Control(BenchSection):
@@ -24,7 +24,7 @@ class Control(BenchSection):
 
     law: Literal["cascade"] = "cascade"
     position_gain_1_s: Positive = Field(description="Kv [1/s]")
-    velocity_feedforward: NotNegative = Field(1.0, description="1 is 100 %")
+    velocity_feedforward: NotNegative = Field(1.0, description="share of the velocity set-point fed forward, 1: all")
     position_period_s: Period = 0.004
     velocity_gain_n_m_s_rad: Positive | None = Field(None, description="Kp [N m s/rad]; or the next two")
     velocity_gain_n_s_m: Positive | None = Field(None, description="Kp of a linear axis [N s/m]")
@@ -33,11 +33,15 @@ class Control(BenchSection):
     velocity_integral_time_s: Positive | None = Field(None, description="Ti [s]; absent: a P velocity loop")
     velocity_integral_time_ms: Positive | None = Field(None, description="Ti [ms]")
     velocity_period_s: Period = 0.001
-    torque_limit_n_m: Positive | None = None
-    force_limit_n: Positive | None = None
-    position_feedback: Literal["motor", "table"] = "motor"
-    velocity_estimate: Literal["backward_difference", "two_sample_mean"] = "backward_difference"
-    velocity_filter_time_constant_s: NotNegative = 0.0
+    torque_limit_n_m: Positive | None = Field(None, description="limit of the torque command; absent: none")
+    force_limit_n: Positive | None = Field(
+        None, description="limit of the force command of a linear axis; absent: none"
+    )
+    position_feedback: Literal["motor", "table"] = Field("motor", description="encoder of the position loop")
+    velocity_estimate: Literal["backward_difference", "two_sample_mean"] = Field(
+        "backward_difference", description="how the velocity follows from the motor encoder"
+    )
+    velocity_filter_time_constant_s: NotNegative = Field(0.0, description="low-pass of that velocity; 0: none")
     velocity_setpoint: Literal["recorded", "backward_difference"] = Field(
         "recorded", description="of the feed-forward, in a recording; or the last difference of its position set-points"
     )
@@ -121,13 +125,15 @@ class UnknownControl(BenchSection):
     """A control law that is not known. It is not simulated, and no mismatch is assigned to it."""
 
     law: Literal["unknown"]
-    velocity_period_s: Period | None = None  # absent: the period of the recording
+    velocity_period_s: Period | None = Field(None, description="absent: the period of the recording")
     torque_delay_s: float | None = Field(
         None, ge=-0.2, le=0.2, description="recorded torque acts so late; estimated from this value; absent: 0 [s]"
     )
-    position_feedback: Literal["motor", "table"] = "motor"
-    torque_limit_n_m: Positive | None = None
-    force_limit_n: Positive | None = None
+    position_feedback: Literal["motor", "table"] = Field("motor", description="encoder of the position loop")
+    torque_limit_n_m: Positive | None = Field(None, description="limit of the torque command; absent: none")
+    force_limit_n: Positive | None = Field(
+        None, description="limit of the force command of a linear axis; absent: none"
+    )
 
     def gains(self, ratio_m_rad: float) -> Gains:
         """Return period, ratio and limit, with gains of 0: a controller that commands nothing.
@@ -167,10 +173,9 @@ def with_law(given: Any) -> Any:
         return {"law": UNKNOWN}
     if not isinstance(given, dict) or UNKNOWN not in given.values():
         return {"law": "cascade", **given} if isinstance(given, dict) else given
+    known = tuple(dict.fromkeys((*Control.model_fields, *UnknownControl.model_fields)))
     for key in given:
-        if key not in Control.model_fields:
-            raise FieldError(
-                ("control", key), f"given an unknown key, allowed one of {', '.join(Control.model_fields)}; remove it"
-            )
+        if key not in known:
+            raise FieldError(("control", key), f"given an unknown key, allowed one of {', '.join(known)}; remove it")
     kept = {key: value for key, value in given.items() if key in UnknownControl.model_fields and value != UNKNOWN}
     return {**kept, "law": UNKNOWN}

@@ -27,32 +27,34 @@ class DriveMode(StrEnum):
 class EncoderConnection(BenchSection):
     """Connection of the linear encoder; its resolution is in the section `encoders`."""
 
-    interface: Literal["canopen", "serial", "none"] = "canopen"
+    interface: Literal["canopen", "serial", "none"] = Field("canopen", description="how the encoder is read")
     node_id: NodeId = 6
     eds: str | None = Field(None, description="EDS file of the encoder; absent: the shipped one")
     serial_number: int | None = Field(None, description="object 0x1018:4; absent: any")
     device: str | None = Field(None, description="serial line, as /dev/ttyUSB0; simulated: absent")
-    baudrate: Annotated[int, Field(gt=0)] = 921_600
-    format: Literal["binary", "ascii"] = "binary"
-    latency_s: NotNegative = 0.0
+    baudrate: Annotated[int, Field(gt=0, description="of the serial line [bit/s]")] = 921_600
+    format: Literal["binary", "ascii"] = Field("binary", description="frames of the serial line")
+    latency_s: NotNegative = Field(0.0, description="age of a reading when it arrives")
 
 
 class SetPointLimits(BenchSection):
     """Limits of every set-point on this bench; a profile beyond them is refused."""
 
-    velocity_m_s: Positive
-    acceleration_m_s2: Positive
-    jerk_m_s3: Positive
+    velocity_m_s: Positive = Field(description="largest velocity")
+    acceleration_m_s2: Positive = Field(description="largest acceleration")
+    jerk_m_s3: Positive = Field(description="largest jerk")
 
 
 class DriveSection(BenchSection):
     """Bus, drive and linear encoder, and what the loop allows before it stops the axis."""
 
     protocol: str = Field("canopen", description="protocol of the drive, a key of hil.loop.devices.PROTOCOLS")
-    interface: Literal["inprocess", "virtual", "udp_multicast", "socketcan"] = "inprocess"
+    interface: Literal["inprocess", "virtual", "udp_multicast", "socketcan"] = Field(
+        "inprocess", description="bus: socketcan for hardware, the others for simulated devices"
+    )
     channel: str = Field("hil", description="socketcan: can0; udp_multicast: an IPv4 group, heard on this PC alone")
-    bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="bit/s")] = 1_000_000
-    mode: DriveMode = DriveMode.CST
+    bitrate: Annotated[int, Field(ge=10_000, le=1_000_000, description="of the bus [bit/s]")] = 1_000_000
+    mode: DriveMode = Field(DriveMode.CST, description="set-point of the drive: torque, velocity or position")
     node_id: NodeId = 5
     master_node_id: NodeId = 1
     eds: str | None = Field(None, description="EDS file of the drive; absent: the shipped one")
@@ -70,7 +72,7 @@ class DriveSection(BenchSection):
         description="compare the set-point that acts in the drive (object 0x6074, 0x606B or 0x6062 in a second "
         "TPDO, if the EDS has it) with those commanded",
     )
-    encoder: EncoderConnection = EncoderConnection()
+    encoder: EncoderConnection = Field(EncoderConnection(), description="connection of the linear encoder")
     travel_m: tuple[float, float] | None = Field(None, description="the axis is stopped outside [m]")
     limits: SetPointLimits | None = Field(
         None,
@@ -92,7 +94,7 @@ class DriveSection(BenchSection):
         "the time in which the torque limit moves the axis by following_error_m, at most 0.05 (without a torque limit "
         "three periods); else 0.05 [s]",
     )
-    supervision: SupervisionSection = SupervisionSection()
+    supervision: SupervisionSection = Field(SupervisionSection(), description="bounds of the checks in each cycle")
     bus_load: Share = Field(0.7, description="largest share of the bus's time at which the drive is armed")
     over_budget: Literal["refuse", "arm"] = Field(
         "refuse",
@@ -117,8 +119,8 @@ class DriveSection(BenchSection):
 class SimulatedEffect(BenchSection):
     """A concealed effect of the simulated axis: ids, forms and parameters as drivers/sim/effects.py lists them."""
 
-    effect: str
-    form: str = ""
+    effect: str = Field(description="id of the effect, as the reference of effects lists them")
+    form: str = Field("", description="its form; absent: the first one")
     parameters: dict[str, float] = Field({}, description="SI values by name")
 
 
@@ -126,8 +128,8 @@ class SimulationSection(BenchSection):
     """True parameters and effects of a simulated bench. If the section is present, the devices are simulated."""
 
     axis: dict[str, float] = Field({}, description="true values of keys of `axis`, where they differ")
-    effects: tuple[SimulatedEffect, ...] = ()
+    effects: tuple[SimulatedEffect, ...] = Field((), description="what the axis does and the owner does not know")
     sensors: dict[str, float] = Field({}, description="as drivers/sim/sensors.py: offsets and noise")
-    seed: Annotated[int, Field(ge=0)] = 1
+    seed: Annotated[int, Field(ge=0, description="of the noise of the sensors")] = 1
     # shorter ones change nothing that a sensor shows, and take minutes for a second of motion
     step_s: Annotated[float, Field(ge=1e-7, le=1e-2, description="internal step of the simulated axis [s]")] = 1e-5

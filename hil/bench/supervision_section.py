@@ -11,9 +11,9 @@ class ResidualThresholds(BenchSection):
     """Largest differences between axis and live twin [m, m, N m or N]; from recordings without fault:
     `hil.identification.residual_thresholds.learn`."""
 
-    motor_m: Positive
-    table_m: Positive | None = None
-    torque: Positive
+    motor_m: Positive = Field(description="of the motor position, at the table")
+    table_m: Positive | None = Field(None, description="of the table position; absent: off")
+    torque: Positive = Field(description="of the torque [N m, N]")
 
 
 class SupervisionSection(BenchSection):

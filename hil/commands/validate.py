@@ -1,5 +1,6 @@
 """hil validate."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -8,14 +9,34 @@ import typer
 from hil.report.console import err, out
 
 
+class Format(StrEnum):
+    """A file format."""
+
+    BENCH = "bench"
+    PROFILE = "profile"
+    MAP = "map"
+
+
 def validate(
-    files: Annotated[list[Path], typer.Argument(help="Bench, profile or map files (YAML).", show_default=False)],
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Bench, profile or map files (YAML).", show_default=False)
+    ] = None,
+    schema: Annotated[
+        Format | None, typer.Option(help="Print the JSON Schema of this format, for editors.", show_default=False)
+    ] = None,
 ) -> None:
     """Check bench, profile and map files, and the EDS files of a bench. Every error names file, line and field."""
     from hil.errors import InputError
 
+    if (schema is None) == (not files):
+        raise InputError("FILES: give files to check, or --schema and a format, not both")
+    if schema is not None:
+        from hil.manual.schemas import schema_text
+
+        out.print(schema_text(schema), end="")
+        return
     problems = []
-    for path in files:
+    for path in files or ():
         try:
             out.print(f"{path}: {_checked(path)}")
         except InputError as error:

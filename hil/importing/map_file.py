@@ -107,11 +107,19 @@ class ChannelSource(_Strict):
         default=None, description="stamps of this channel, if it has its own: it is interpolated to those of the file"
     )
     sign: Literal[1, -1] = Field(default=1, description="-1 if the column is positive the other way")
-    counts_per_rev: PositiveFloat | None = Field(default=None, description="unit counts or counts/s, rotary encoder")
-    counts_per_m: PositiveFloat | None = Field(default=None, description="unit counts or counts/s, linear encoder")
-    torque_constant_n_m_a: PositiveFloat | None = Field(default=None, description="unit A, torque")
-    force_constant_n_a: PositiveFloat | None = Field(default=None, description="unit A, force")
-    rated: PositiveFloat | None = Field(default=None, description="unit % or permille: rated value in SI")
+    counts_per_rev: PositiveFloat | None = Field(
+        default=None, description="counts of a rotary encoder, for the units counts and counts/s [1/rev]"
+    )
+    counts_per_m: PositiveFloat | None = Field(
+        default=None, description="counts of a linear encoder, for the units counts and counts/s [1/m]"
+    )
+    torque_constant_n_m_a: PositiveFloat | None = Field(
+        default=None, description="torque per current, for the unit A [N m/A]"
+    )
+    force_constant_n_a: PositiveFloat | None = Field(
+        default=None, description="force per current, for the unit A [N/A]"
+    )
+    rated: PositiveFloat | None = Field(default=None, description="value in SI at 100 %, for the units % and permille")
     gain: float | str | None = Field(
         default=None, description="unit V: SI unit per volt, a number or the name of a scalar in a .mat file"
     )

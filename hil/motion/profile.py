@@ -1,9 +1,5 @@
-"""Profile files: limits, travel, and segments in the order of their execution.
+"""Profile files: limits, travel, and segments in the order of their execution."""
 
-`python -m hil.motion.profile` prints the JSON Schema that editors complete by (hil/profile.schema.json).
-"""
-
-import json
 import math
 from collections import Counter
 from functools import cached_property
@@ -45,9 +41,9 @@ class Run(NamedTuple):
 class Profile(Part):
     """A trajectory profile: limits and the segments that run one after the other, each from rest to rest."""
 
-    schema_version: Literal[1] = Field(description="1")
+    schema_version: Literal[1] = Field(description="version of the format")
     description: str = Field("", description="what the profile is for")
-    limits: Limits
+    limits: Limits = Field(description="largest magnitudes of the set-points")
     start_m: Position = Field(0.0, description="where the profile starts [m]")
     position_min_m: Position | None = Field(None, description="lower end of the travel [m]")
     position_max_m: Position | None = Field(None, description="upper end of the travel [m]")
@@ -161,12 +157,3 @@ def write_profile(path: Path, profile: Profile) -> None:
 def load_profile(path: str | Path) -> Profile:
     """Read a profile file; InputError with file, line and field for anything that cannot be run."""
     return load_model(path, Profile)
-
-
-def json_schema() -> str:
-    """JSON Schema of profile files, as hil/profile.schema.json holds it."""
-    return json.dumps(Profile.model_json_schema(), indent=1) + "\n"
-
-
-if __name__ == "__main__":
-    print(json_schema(), end="")

@@ -49,11 +49,11 @@ def progress() -> Iterator[Progress]:
         yield update
 
 
-def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; all columns but the first are aligned to the right."""
+def table(headers: Sequence[str], rows: Sequence[Sequence[str]], *, right: bool = True) -> None:
+    """Print a table; all columns but the first are aligned to the right, unless they hold text (`right=False`)."""
     view = Table(box=None, pad_edge=False, header_style="bold")
     for index, header in enumerate(headers):
-        view.add_column(header, justify="right" if index else "left")
+        view.add_column(header, justify="right" if index and right else "left")
     for row in rows:
         view.add_row(*row)
     out.print(view)

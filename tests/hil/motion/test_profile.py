@@ -10,7 +10,8 @@ import pytest
 import yaml
 
 from hil.errors import InputError
-from hil.motion.profile import Profile, json_schema, load_profile
+from hil.manual.schemas import schema_text
+from hil.motion.profile import Profile, load_profile
 
 ROOT = Path(__file__).parents[3]
 SHIPPED = sorted((ROOT / "profiles").iterdir())
@@ -57,8 +58,8 @@ def test_a_shipped_profile_loads_and_names_its_schema(path: Path) -> None:
 
 
 def test_the_published_schema_is_current() -> None:
-    assert (ROOT / "hil/profile.schema.json").read_text(encoding="utf-8") == json_schema(), (
-        "run: python -m hil.motion.profile > hil/profile.schema.json"
+    assert (ROOT / "hil/motion/profile.schema.json").read_text(encoding="utf-8") == schema_text("profile"), (
+        "run: hil validate --schema profile > hil/motion/profile.schema.json"
     )
 
 

@@ -29,7 +29,7 @@ LONGEST_ROWS = 400  # of the correlation counted in an error: noise of sensors a
 
 
 @dataclass(frozen=True, eq=False)
-class LawRows:
+class FittedRows:
     """Rows of one run: quantity x (n,), factor of the law in the residual (n,), residuals (n,), rows that count."""
 
     x: FloatArray
@@ -76,14 +76,14 @@ def law_at(
     return np.asarray(found, dtype=np.float64)
 
 
-def bin_edges(rows: Sequence[LawRows], most: int) -> FloatArray:
+def bin_edges(rows: Sequence[FittedRows], most: int) -> FloatArray:
     """Edges (m + 1,) of bins of equal width for the rows that count."""
     x = np.concatenate([one.x[one.used] for one in rows])
     count = int(np.clip(x.size / ROWS_PER_BIN, 6, most))
     return np.linspace(float(x.min()), float(x.max()), count + 1)
 
 
-def means(rows: Sequence[LawRows], edges: FloatArray) -> Means:
+def means(rows: Sequence[FittedRows], edges: FloatArray) -> Means:
     """Means of the bins that hold enough rows; errors count the autocorrelation of what the means leave."""
     count = edges.size - 1
     at = [np.clip(np.searchsorted(edges, one.x, side="right") - 1, 0, count - 1) for one in rows]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
-from hil.diagnosis.pictures.fitted_law import FINE, LawRows, bin_edges, law_at, means
+from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, bin_edges, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
@@ -95,9 +95,9 @@ def friction_law(fit: Fit, terms: Sequence[Term], sign: float, speed: FloatArray
     return level + sign * more
 
 
-def _rows(view: View, sign: float) -> LawRows:
+def _rows(view: View, sign: float) -> FittedRows:
     """Rows that move in one direction; more friction is a torque against the motion."""
     before, after = view.residuals("motor")
     used = view.torque.sliding & (sign * view.torque.velocity > 0.0)
     used[: view.run.evaluated.start] = False
-    return LawRows(np.abs(view.torque.velocity), np.full(before.size, -sign), before, after, used)
+    return FittedRows(np.abs(view.torque.velocity), np.full(before.size, -sign), before, after, used)

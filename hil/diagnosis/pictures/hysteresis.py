@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
-from hil.diagnosis.pictures.fitted_law import FINE, LawRows, law_at, means
+from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View, longest, noise, unit_of_channel
 from hil.diagnosis.search.disturbance import smooth
 from hil.diagnosis.turning import speed_unit
@@ -130,7 +130,7 @@ def _loop(axis: Axes, diagnosis: Diagnosis, view: View, loop: LoopSignals, label
     used[rows] = True
     count = int(np.clip((rows.stop - rows.start) // ROWS_PER_POINT, 4, POINTS))
     edges = np.linspace(float(row[rows][0]), float(row[rows][-1]), count + 1)
-    found = means([LawRows(row, one, loop.before, loop.measured - loop.after, used, loop.resolution)], edges)
+    found = means([FittedRows(row, one, loop.before, loop.measured - loop.after, used, loop.resolution)], edges)
     middle = np.round(found.x).astype(int)
     points = loop.after[middle] + found.after
     along, x_unit = reading_unit("rad" if diagnosis.given_bench.axis.turns else "m", float(position[rows].max()))
@@ -154,7 +154,7 @@ def _over_load(axis: Axes, diagnosis: Diagnosis, views: Sequence[View], unit: st
         used[run.evaluated] = True
         load = -ratio * law_at(term, diagnosis.final.bench, -twin / ratio)
         deflections.append(float(np.abs(twin[run.evaluated]).max()))
-        rows.append(LawRows(load, np.ones(twin.size), twin + after, after, used))
+        rows.append(FittedRows(load, np.ones(twin.size), twin + after, after, used))
     fine = np.linspace(-1.0, 1.0, FINE) * max(deflections)
     load = -ratio * law_at(term, diagnosis.final.bench, -fine / ratio)
     found = means(rows, np.linspace(float(load.min()), float(load.max()), BINS + 1))
@@ -169,7 +169,7 @@ def _over_speed(axis: Axes, diagnosis: Diagnosis, views: Sequence[View], unit: s
     """Draw the deflection over the speed of the table, whose friction makes it."""
     axis_of = diagnosis.given_bench.axis
     ratio, (to_read, unit_of_speed) = axis_of.ratio_m_rad, speed_unit(axis_of.turns)
-    rows: dict[str, list[LawRows]] = {"measured": [], "before": [], "after": []}
+    rows: dict[str, list[FittedRows]] = {"measured": [], "before": [], "after": []}
     for view in views:
         before, after = view.residuals("table")
         stretch = view.run.table_m - ratio * view.run.motor
@@ -178,7 +178,7 @@ def _over_speed(axis: Axes, diagnosis: Diagnosis, views: Sequence[View], unit: s
         used[view.run.evaluated] = view.torque.sliding[view.run.evaluated]
         speed = ratio * view.torque.velocity
         for name, values in (("measured", stretch), ("before", stretch - before), ("after", stretch - after)):
-            rows[name].append(LawRows(speed, one, values, after, used))
+            rows[name].append(FittedRows(speed, one, values, after, used))
     x = np.concatenate([one.x[one.used] for one in rows["measured"]])
     edges = np.linspace(float(x.min()), float(x.max()), BINS + 1)
     found = {name: means(each, edges) for name, each in rows.items()}

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
-from hil.diagnosis.pictures.fitted_law import FINE, LawRows, Means, bin_edges, means
+from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, Means, bin_edges, means
 from hil.diagnosis.pictures.laws import DrawnLaw
 from hil.diagnosis.pictures.over_time import residual_over_time
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
@@ -42,7 +42,7 @@ def law_picture(law: DrawnLaw) -> Drawer:
     return picture
 
 
-def _over_all(law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[LawRows]) -> Captioned:
+def _over_all(law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[FittedRows]) -> Captioned:
     """Draw the law over the whole quantity; below, what is left before and after."""
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
     edges = bin_edges(rows, BINS)
@@ -66,12 +66,12 @@ def _over_all(law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: 
 
 
 def _folded(
-    law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[LawRows], period: float
+    law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[FittedRows], period: float
 ) -> Captioned:
     """Draw the law within one period beside the spectrum over the order."""
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
     folded = [
-        LawRows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used, one.resolution) for one in rows
+        FittedRows(np.mod(one.x, period), one.carrier, one.before, one.after, one.used, one.resolution) for one in rows
     ]
     found = means(folded, np.linspace(0.0, period, BINS_OF_PERIOD + 1))
     fine = np.linspace(0.0, period, FINE)
@@ -122,7 +122,7 @@ def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
     style_axis(axis, f"left\n[{name}]")
 
 
-def _spectrum(axis: Axes, law: DrawnLaw, rows: Sequence[LawRows], period: float, unit: str) -> None:
+def _spectrum(axis: Axes, law: DrawnLaw, rows: Sequence[FittedRows], period: float, unit: str) -> None:
     """Draw the amplitude of what is left over the order, before and after."""
     order = law.over.per_unit / period
     orders, before, after = spectra(law, rows, order)
@@ -136,7 +136,7 @@ def _spectrum(axis: Axes, law: DrawnLaw, rows: Sequence[LawRows], period: float,
     style_axis(axis, f"amplitude of what is left [{name}]", label)
 
 
-def spectra(law: DrawnLaw, rows: Sequence[LawRows], order: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def spectra(law: DrawnLaw, rows: Sequence[FittedRows], order: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Orders (m,) and amplitudes (m,) of the residuals there before and after, by regression on the carrier."""
     turns, carrier, before, after = (
         [values[one.used] for values, one in zip(each, rows, strict=True)]

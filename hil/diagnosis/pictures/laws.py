@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.pictures.fitted_law import LawRows, law_at
+from hil.diagnosis.pictures.fitted_law import FittedRows, law_at
 from hil.diagnosis.pictures.view import View, label_of_channel, unit_of_channel
 from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term
@@ -53,7 +53,7 @@ class DrawnLaw:
     period: Callable[[Term], float | None] = lambda term: None
     bare: Callable[[FloatArray], FloatArray] = np.zeros_like
 
-    def rows(self, diagnosis: Diagnosis, view: View) -> LawRows:
+    def rows(self, diagnosis: Diagnosis, view: View) -> FittedRows:
         """The rows of a run in which the axis slides and the law enters."""
         before, after = view.residuals(self.channel(view))
         carrier = self.carrier(diagnosis, view)
@@ -67,7 +67,7 @@ class DrawnLaw:
             some = np.flatnonzero(used)[:: max(np.count_nonzero(used) // ZERO_ROWS, 1)]
             law = carrier[some] * self.value(view.term, diagnosis, x[some])
             before = before - float(np.mean((before - after)[some] - law))
-        return LawRows(x, carrier, before, after, used)
+        return FittedRows(x, carrier, before, after, used)
 
     def labelled(self, diagnosis: Diagnosis, view: View) -> tuple[str, str]:
         """Label and SI unit of what is drawn."""

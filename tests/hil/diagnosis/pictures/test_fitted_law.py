@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench
 
-from hil.diagnosis.pictures.fitted_law import LawRows, bin_edges, law_at, means
+from hil.diagnosis.pictures.fitted_law import FittedRows, bin_edges, law_at, means
 from hil.identification.terms import Term
 
 SIZE = 20_000
@@ -20,7 +20,7 @@ def test_errors_of_means_are_those_of_noise_with_memory_that_grows_with_the_carr
         noise = draw.normal(size=SIZE)
         for row in range(1, SIZE):
             noise[row] += memory * noise[row - 1]
-        rows = [LawRows(x, carrier, 0.3 * carrier + noise, noise, np.ones(SIZE, dtype=bool))]
+        rows = [FittedRows(x, carrier, 0.3 * carrier + noise, noise, np.ones(SIZE, dtype=bool))]
         one = means(rows, bin_edges(rows, 30))
         found.append(np.mean((one.after / one.error) ** 2))
         assert np.mean(np.abs(one.before - one.after - 0.3)) < 1e-9
@@ -29,7 +29,7 @@ def test_errors_of_means_are_those_of_noise_with_memory_that_grows_with_the_carr
 
 def test_a_bin_with_few_rows_has_no_point() -> None:
     x = np.concatenate([np.zeros(100), [9.5, 9.6]])
-    rows = [LawRows(x, np.ones(102), x, np.random.default_rng(1).normal(size=102), np.ones(102, dtype=bool))]
+    rows = [FittedRows(x, np.ones(102), x, np.random.default_rng(1).normal(size=102), np.ones(102, dtype=bool))]
     assert means(rows, np.linspace(0.0, 10.0, 11)).x.size == 1
 
 

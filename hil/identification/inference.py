@@ -24,7 +24,7 @@ Filter = FloatArray
 
 _ORDER = 24  # of the autoregressive model: 24 ms at 1 kHz, the period of the slowest control resonance
 # Added to each energy per row, in units of noise^2: differences below a tenth of the noise in rms carry no evidence.
-BLUR = 0.01
+_BLUR = 0.01
 TIED = 10.0  # BIC difference: a rival closer than this is not refuted. "Very strong" evidence (Kass and Raftery 1995)
 # Difference in energy per row, in units of noise^2, up to which a rival is not refuted, whatever the evidence: 7 % of
 # the noise in rms. The model discrepancy of two simulations of one axis is as large.
@@ -38,10 +38,10 @@ def whitening(fit: Fit) -> list[Filter]:
 
 
 def _prediction_error_filter(part: FloatArray) -> Filter:
-    """Solve the Yule-Walker equations with `BLUR` added to the variance: a residual of zeros gives the filter 1."""
+    """Solve the Yule-Walker equations with `_BLUR` added to the variance: a residual of zeros gives the filter 1."""
     centred = part - part.mean()
     covariance = correlate(centred, centred, method="fft")[part.size - 1 : part.size + _ORDER] / part.size
-    covariance[0] += BLUR
+    covariance[0] += _BLUR
     return np.concatenate([[1.0], -np.asarray(solve_toeplitz(covariance[:-1], covariance[1:]), dtype=np.float64)])
 
 
@@ -68,7 +68,7 @@ def bic_gain(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) -
         worse.residuals.parts.values(),
         strict=True,
     ):
-        blur = BLUR * a.size
+        blur = _BLUR * a.size
         left, right = lfilter(taps, [1.0], a), lfilter(taps, [1.0], b)
         white += a.size * np.log((float(right @ right) + blur) / (float(left @ left) + blur))
     return float(max(plain, white - more * np.log(better.rows)))
@@ -91,7 +91,7 @@ def by_energy(better: Fit, worse: Fit) -> float:
     more = better.hypothesis.free - worse.hypothesis.free
     evidence = rows = 0.0
     for a, b in zip(better.residuals.parts.values(), worse.residuals.parts.values(), strict=True):
-        own, blur = a.size / correlation_time(a), BLUR * a.size
+        own, blur = a.size / correlation_time(a), _BLUR * a.size
         evidence += own * np.log((float(b @ b) + blur) / (float(a @ a) + blur))
         rows += own
     return float(evidence - more * np.log(rows))

@@ -20,7 +20,7 @@ from hil.diagnosis.search.events import EVENTS, event_term
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inference import BLUR, correlation_time, whitened, whitening
+from hil.identification.inference import correlation_time, whitened, whitening
 from hil.identification.parallel import POOL
 from hil.identification.terms import Term, compatible, free_slot, repeats
 from hil.twin.library import BY_ID
@@ -60,13 +60,11 @@ class _View:
     channels: tuple[str, ...]  # of each part
     splits: tuple[int, ...]
     filters: list[FloatArray] | None
-    independent: tuple[float, ...]  # rows of each part
+    independent: float  # rows
 
     def evidence(self, left: FloatArray) -> float:
         """Evidence for what leaves this residual (m,), negative where there is more than before."""
-        parts = (np.split(values, self.splits) for values in (self.residual, left))
-        pairs = ((float(a @ a) + BLUR * a.size, float(b @ b) + BLUR * b.size) for a, b in zip(*parts, strict=True))
-        return sum(rows * float(np.log(a / b)) for rows, (a, b) in zip(self.independent, pairs, strict=True))
+        return self.independent * float(np.log(float(self.residual @ self.residual) / max(float(left @ left), 1e-300)))
 
     def of(self, change: FloatArray) -> FloatArray:
         """Filter, weight and project a change (m,) of the residuals in the same way."""
@@ -93,7 +91,9 @@ def _view(base: Fit, white: bool) -> _View:
     nuisance, _ = qr(weights[:, None] * slopes, mode="economic", overwrite_a=True, check_finite=False)
     residual = weights * seen
     left, channels = residual - nuisance @ (nuisance.T @ residual), tuple(channel for _, channel in residuals.parts)
-    independent = tuple(part.size / (1.0 if white else correlation_time(part)) for part in residuals.parts.values())
+    energies = [float(part @ part) for part in residuals.split(left)]
+    rows = [part.size / (1.0 if white else correlation_time(part)) for part in residuals.split(residual)]
+    independent = float(np.dot(energies, rows)) / max(sum(energies), 1e-300)  # mean of the channels, by their energy
     return _View(weights, nuisance, left, channels, residuals.splits, filters, independent)
 
 

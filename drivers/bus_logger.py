@@ -40,7 +40,7 @@ def log(bus: can.BusABC, path: Path) -> int:
                 continue
             if frame is not None:
                 if not frame.timestamp:  # a bus of this PC, whose frames have none
-                    frame.timestamp = time.time()
+                    frame.timestamp = time.monotonic()  # only differences count
                 writer.on_message_received(frame)
                 frames, heard_s = frames + 1, time.monotonic()
             if not ending and (frame is None or frames % 100 == 0):

@@ -154,9 +154,9 @@ def _torque(of: Addition | Ablation, c: Criteria) -> Answer | None:
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
-    """Little is left, or noise; where inputs are open, or every channel is at its floor, most is explained."""
+    """Little is left, or noise beside what is explained; with open inputs, or at the floor, most is explained."""
     stands = (
-        (of.noise and of.above <= c.coloured)
+        (of.noise and of.left < 1.0)
         or names_stand(of.left, of.above, c)
         or (of.open_inputs and of.left <= c.most_left)
         or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))

@@ -5,6 +5,7 @@ Both axes are twins in closed loop on the same set-points, one with the mechanis
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -32,14 +33,7 @@ ROUNDING = 1e-9  # N m, m, rad: less is no change
 WAVES = 4.0  # of a periodic mechanism over the position: more would be a black area
 SETTLED_S = 0.3  # before it, the loops answer to the start
 # values of a motion of 6 s over 100 mm (turning: 4 rad) with up to 5 N m, where typical ones lie outside of it
-_WITHIN = {
-    "torque_saturation": {"limit_n_m": 3.0},
-    "external_force": {"start_s": 2.0, "end_s": 2.5},
-    "local_friction": {"begin_m": 0.04, "end_m": 0.06, "flank_m": 0.005},
-    "end_stop": {"edge_m": 0.08},
-    "thermal_growth": {"time_constant_s": 2.0},
-    "friction_drift": {"time_constant_s": 2.0},
-}
+_WITHIN: dict[str, dict[str, float]] = json.loads(Path(__file__).with_suffix(".json").read_text(encoding="utf-8"))
 
 
 class MechanismChange(NamedTuple):

@@ -9,6 +9,7 @@ import numpy as np
 
 from drivers.cia402 import DriveState
 from drivers.emcy import error_text
+from hil.motion.trajectory import SegmentRun
 from hil.scope.rows import ScopeRows
 from hil.scope.traces import BEFORE, Trace
 
@@ -26,7 +27,7 @@ def state_text(number: float) -> str:
 def duration_s(metadata: Mapping[str, Any]) -> float | None:
     """Length of the profile [s], as the run planned it; None if that is not recorded."""
     try:
-        return float(metadata["segments"][-1]["end_s"]) or None
+        return float(SegmentRun(**metadata["segments"][-1]).end_s) or None
     except (KeyError, IndexError, TypeError, ValueError):
         return None
 

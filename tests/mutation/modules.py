@@ -23,6 +23,7 @@ def _loop(*names: str) -> tuple[str, ...]:
 
 
 _EDS_OF_A_BENCH = ("tests/hil/commands/test_eds_of_a_bench.py",)
+_BUS_LOG = ("tests/hil/exchange/test_bus_log.py",)
 _DOCTOR = ("tests/hil/commands/test_doctor.py",)
 _EDS = _drivers("eds_types", "eds", "eds_dialects") + _EDS_OF_A_BENCH
 _SERIAL = _drivers("serial")
@@ -36,6 +37,7 @@ _SESSION = _loop("session", "session_times", "session_arming", "session_power_of
 MODULES = {
     "drivers/acting_setpoint.py": Suite(_drivers("acting_setpoint")),
     "drivers/bus.py": Suite(_drivers("bus", "foreign_frames")),
+    "drivers/bus_logger.py": Suite(_BUS_LOG),
     "drivers/canopen_drive.py": Suite(_DRIVE),
     "drivers/canopen_encoder.py": Suite(_drivers("encoders", "faults_devices", "faults_frames")),
     "drivers/canopen_master.py": Suite(_drivers("heartbeats", "faults_watchdogs")),
@@ -66,6 +68,7 @@ MODULES = {
     "drivers/stop_watch.py": Suite(_drivers("stop_watch", "stop_answered")),
     "hil/loop/bounds.py": Suite(_loop("bounds")),
     "hil/loop/can_interfaces.py": Suite(_DOCTOR),
+    "hil/loop/bus_log.py": Suite(_BUS_LOG),
     "hil/loop/certificate.py": Suite(_loop("certificate")),
     "hil/loop/checks.py": Suite(_loop("checks", "encoder_checks"), compiled=False),
     "hil/loop/clock.py": Suite(_loop("clock", "late_ticks")),

@@ -90,6 +90,8 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
     for take in (3, 2, 1):
         if len(tokens) > take:
             unit = unit_named("_".join(tokens[-take:]).replace("°", "deg"))
+            if tokens[-1] == "M" and name != name.upper():
+                unit = None  # phi_M, of the motor; the symbol of the metre is m
             if unit and unit != "min" and not (unit == "rev" and len(tokens[-1]) < LEAST_ALONE):
                 return "_".join(tokens[:-take]), unit, False
     return name, None, False

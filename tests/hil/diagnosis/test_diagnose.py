@@ -78,6 +78,7 @@ def test_wrong_gains_are_settings_of_the_controller_and_no_physics() -> None:
     assert any("Check the controller's settings" in note for note in result.notes)
 
 
+@pytest.mark.long
 def test_a_cause_is_named_beside_wrong_gains() -> None:
     result = answer(laps(COGGING), believed(**WRONG))
     assert [finding.effect for finding in result.missing] == ["cogging_torque"]
@@ -125,5 +126,6 @@ def test_a_push_is_named_with_its_window() -> None:
     assert window.strength.value == pytest.approx(400.0, rel=0.02)
 
 
+@pytest.mark.long
 def test_the_moment_at_which_the_inertia_changes_is_said(tmp_path: Path) -> None:
     assert_change_is_told(tmp_path, 4000)  # in the training part

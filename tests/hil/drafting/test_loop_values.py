@@ -130,6 +130,7 @@ def test_the_encoder_of_the_position_loop_is_told(on_motor: bool, torque_only: b
     assert {key: drafted[key] for key in OF_TABLE} == pytest.approx(OF_TABLE, rel=5e-3)
 
 
+@pytest.mark.long
 def test_on_a_rigid_axis_the_encoder_of_the_position_loop_is_not_told() -> None:
     """The motor stands for it, and the draft says so."""
     rigid = changed(table_run(guideway_n=0.0, stiffness_n_m=2.5e10, noise_n_m=0.02), torque_command_n_m=None)

@@ -63,3 +63,8 @@ def test_what_is_no_revolution(name: str, unit: str | None) -> None:
 @pytest.mark.parametrize(("name", "unit"), [("rpm", "rpm"), ("trq_pct_avg", "%"), ("vel_rpm_mean", "rpm")])
 def test_a_unit_that_is_the_name_or_stands_before_its_last_word(name: str, unit: str) -> None:
     assert label(name).unit == unit
+
+
+@pytest.mark.parametrize(("name", "unit"), [("phi_M", None), ("phi_m", "m"), ("POS_M", "m")])
+def test_a_capital_is_no_metre_where_the_name_has_small_letters(name: str, unit: str | None) -> None:
+    assert split_unit(name)[1] == unit

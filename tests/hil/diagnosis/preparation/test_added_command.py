@@ -77,6 +77,7 @@ def test_windows_that_the_axis_felt_are_told_and_the_plant_judged_alone() -> Non
     assert set(commands) <= set(recording["torque_command_n_m"])
 
 
+@pytest.mark.long
 @pytest.mark.xfail(
     strict=True, reason="what a wrong gain leaves hides the windows: law and windows are not fitted together"
 )

@@ -47,6 +47,7 @@ def test_the_speed_set_point_of_a_known_law_changes_nothing() -> None:
     assert checked(run(scale=57.3), OWNER) == LawCheck(OWNER)
 
 
+@pytest.mark.long
 def test_a_velocity_loop_is_learnt_beside_an_unknown_position_loop() -> None:
     """The position loop adds what no set-point tells; the velocity loop follows its own input."""
     recording, owner = run(scale=3.0), believed(**WRONG)
@@ -60,6 +61,7 @@ def test_a_velocity_loop_is_learnt_beside_an_unknown_position_loop() -> None:
     assert "speed set-point" in law.advice
 
 
+@pytest.mark.long
 def test_another_speed_is_no_speed_set_point() -> None:
     """The chain of both loops is learnt where the column named so is not the output of the position loop."""
     recording = run()

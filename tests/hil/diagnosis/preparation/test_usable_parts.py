@@ -75,6 +75,7 @@ def test_a_comparison_takes_one_part() -> None:
     assert hil.compare(recording.parts()[0], BENCH).explained
 
 
+@pytest.mark.long
 def test_compare_identify_and_friction_work_on_the_parts(tmp_path: Path) -> None:
     recording = cut((ROWS // 2, ROWS // 2 + 300))
     write_parquet(recording, tmp_path / "cut.parquet")

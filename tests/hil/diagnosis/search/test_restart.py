@@ -54,6 +54,7 @@ def stiff_owner() -> tuple[Bench, Bench]:
     return owner, owner.model_copy(update={"axis": axis.model_copy(update=true)})
 
 
+@pytest.mark.long
 def test_it_is_fitted_although_the_refit_leaves_next_to_nothing() -> None:
     owner, truth = stiff_owner()
     run = take(recorded(truth, LOST, times=2), owner)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.commands.options import AxisInNames, Rate
 from hil.diagnosis.time_left import BUDGET_S
 from hil.report.console import err, out, progress, table
 
@@ -27,16 +28,8 @@ def explain(
             "Default: explained-NAME, of the first file, in this folder.",
         ),
     ] = None,
-    rate_hz: Annotated[
-        float | None,
-        typer.Option("--rate", min=0.1, help="Rows per second, for a file without time stamps.", show_default=False),
-    ] = None,
-    axis: Annotated[
-        str | None,
-        typer.Option(
-            help="Number or letter of the axis in the names of columns, of a file with several.", show_default=False
-        ),
-    ] = None,
+    rate_hz: Rate = None,
+    axis: AxisInNames = None,
     show: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
     budget_s: Annotated[
         float,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hil.commands.options import AxisInNames, Rate
 from hil.report.console import err, out
 
 if TYPE_CHECKING:
@@ -36,16 +37,8 @@ def import_(
         Path | None,
         typer.Option("--out", help="Parquet file to write. Default: the name of the source, in this folder."),
     ] = None,
-    rate_hz: Annotated[
-        float | None,
-        typer.Option("--rate", min=0.1, help="Rows per second, for a file without time stamps.", show_default=False),
-    ] = None,
-    axis: Annotated[
-        str | None,
-        typer.Option(
-            help="Number or letter of the axis in the names of columns, of a file with several.", show_default=False
-        ),
-    ] = None,
+    rate_hz: Rate = None,
+    axis: AxisInNames = None,
     bench: Annotated[
         str | None,
         typer.Option(

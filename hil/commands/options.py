@@ -21,3 +21,15 @@ ResetFault = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(min=0, help="Seed of the simulated sensors. Default: the bench's seed.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder for the results. Default: a new one in runs/.")]
+Rate = Annotated[
+    float | None,
+    typer.Option("--rate", min=0.1, help="Rows per second, for a file without time stamps.", show_default=False),
+]
+AxisInNames = Annotated[
+    str | None,
+    typer.Option(
+        "--axis",
+        help="Number or letter of the axis in the names of columns, of a file with several.",
+        show_default=False,
+    ),
+]

@@ -79,13 +79,13 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] =
 
 
 def _structure(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
-    """What is left depends on something: where, and the map of it that has no name."""
+    """The residual depends on something: where, and the map of it that has no name."""
     result = diagnosis.result
     if result.structure and (figure := structure_figure(diagnosis)):
         page.picture(save(figure, folder / "structure.png"), CAPTION_OF_STRUCTURE)
     for one in result.unnamed:
         page.text(
-            f"{one.effect.replace('_', ' ').capitalize()}: bench.diagnosed.yaml has it. What is left on held-out "
+            f"{one.effect.replace('_', ' ').capitalize()}: bench.diagnosed.yaml has it. The residual on held-out "
             f"recordings falls from {digits(one.held_out_before)} to {digits(one.held_out_after)} rms. "
             f"Nearest mechanism of the library: {one.nearest or 'none was fitted'}."
         )

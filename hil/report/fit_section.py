@@ -1,4 +1,4 @@
-"""Sections of a report: what is left before and after, and the parameters of the bench."""
+"""Sections of a report: the residual before and after, and the parameters of the bench."""
 
 from pathlib import Path
 
@@ -65,7 +65,7 @@ def fit_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
 
 
 def torque_line(left: TorqueLeft) -> str:
-    """One line: the torque left on held-out motion by each twin, and by the plain model."""
+    """One line: the residual torque on held-out motion of each twin, and by the plain model."""
     shares = {
         "bench file": left.owner,
         "refitted": left.refitted,
@@ -73,7 +73,7 @@ def torque_line(left: TorqueLeft) -> str:
         "plain least squares": left.plain,
     }
     given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
-    return f"Torque left on held-out motion, of the torque's standard deviation: {given}."
+    return f"Residual torque on held-out motion, of the torque's standard deviation: {given}."
 
 
 def _figures(found: FitFigures, unit: str) -> list[str]:

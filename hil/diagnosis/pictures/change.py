@@ -1,4 +1,4 @@
-"""Figure of a change of the axis: the torque left by one set of parameters, and by those of each part."""
+"""Figure of a change of the axis: the residual torque of one set of parameters, and of those of each part."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 DRAWN_ROWS = 6000  # several per pixel
 CAPTION = (
-    "What the twin leaves with one set of parameters for all recordings, and with those of each part. The line marks "
+    "Residual with one set of parameters for all recordings, and with those of each part. The line marks "
     "the moment of the change."
 )
 

@@ -88,7 +88,7 @@ def correlation(pair: Pair, view: View, finer: int = 1) -> Correlation:
     measured, before, after = (
         finer * np.fft.irfft(np.conj(spectra[0]) * other, finer * size)[lags] / scale for other in spectra[1:]
     )
-    # variance of the cross-correlation of two independent signals (Bartlett): of what is left that has neither the
+    # variance of the cross-correlation of two independent signals (Bartlett): of the residual that has neither the
     # shape of the signal nor of a delay of it, and of the signal
     shapes = np.stack([rates[0], np.gradient(rates[0])])
     left = rates[1] - rates[3]

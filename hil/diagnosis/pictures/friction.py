@@ -66,7 +66,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
         axis.set_xscale("log")
     style_axis(linear, f"friction [{unit}]")
     style_axis(logarithmic, "")
-    style_axis(left, f"left [{unit}]", f"speed of the table [{unit_of_speed}]")
+    style_axis(left, f"residual [{unit}]", f"speed of the table [{unit_of_speed}]")
     style_axis(left_log, "", f"speed of the table [{unit_of_speed}], logarithmic")
     for axis in (left, left_log):
         axis.axhline(0.0, color="black", linewidth=0.8)

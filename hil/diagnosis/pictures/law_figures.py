@@ -1,4 +1,4 @@
-"""Figures of a law over one quantity: the curve through its points, and what is left before and after."""
+"""Figures of a law over one quantity: the curve through its points, and the residual before and after."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def law_picture(law: DrawnLaw) -> Drawer:
 
 
 def _over_all(law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: Sequence[FittedRows]) -> Captioned:
-    """Draw the law over the whole quantity; below, what is left before and after."""
+    """Draw the law over the whole quantity; below, the residual before and after."""
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
     edges = bin_edges(rows, BINS)
     found, fine = means(rows, edges), np.linspace(edges[0], edges[-1], FINE)
@@ -116,24 +116,24 @@ def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
     factor, name = reading_unit(unit, float(np.abs(found.before).max()))
     axis.axhline(0.0, color="black", linewidth=0.8)
     axis.plot(
-        along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label="left before"
+        along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label="residual before"
     )
     looks.points(axis, along * found.x, factor * found.after, factor * found.error)
-    style_axis(axis, f"left\n[{name}]")
+    style_axis(axis, f"residual\n[{name}]")
 
 
 def _spectrum(axis: Axes, law: DrawnLaw, rows: Sequence[FittedRows], period: float, unit: str) -> None:
-    """Draw the amplitude of what is left over the order, before and after."""
+    """Draw the amplitude of the residual over the order, before and after."""
     order = law.over.per_unit / period
     orders, before, after = spectra(law, rows, order)
     factor, name = reading_unit(unit, float(before.max()))
-    axis.fill_between(orders, 0.0, factor * before, color=COMMAND, alpha=0.45, linewidth=0.0, label="left before")
-    axis.plot(orders, factor * after, color=MEASURED, linewidth=1.0, label="left after")
+    axis.fill_between(orders, 0.0, factor * before, color=COMMAND, alpha=0.45, linewidth=0.0, label="residual before")
+    axis.plot(orders, factor * after, color=MEASURED, linewidth=1.0, label="residual after")
     axis.set_xlim(orders[0], orders[-1])
     axis.set_ylim(0.0, None)
     axis.axvline(order, color=DEVIATION, linewidth=1.0, linestyle=":")
     label = law.over.per if "[" in law.over.per else f"cycles {law.over.per}"
-    style_axis(axis, f"amplitude of what is left [{name}]", label)
+    style_axis(axis, f"amplitude of the residual [{name}]", label)
 
 
 def spectra(law: DrawnLaw, rows: Sequence[FittedRows], order: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -52,7 +52,7 @@ class Need:
 
 
 @dataclass(frozen=True, eq=False)
-class _Added:
+class _GrownFit:
     """The fit after a term was added and what is not needed was removed, the need of its terms, and its rivals."""
 
     fit: Fit
@@ -60,9 +60,9 @@ class _Added:
     rivals: dict[Key, list[RivalFit]]
 
 
-def _added(
+def _grown(
     additions: Additions, round_: SearchRound, nominal: Fit, tried: Collection[Sequence[tuple[str, int]]]
-) -> tuple[_Added | None, list[Considered]]:
+) -> tuple[_GrownFit | None, list[Considered]]:
     """Add the best of the terms that stand; one that is removed again gives its place to the next.
 
     None where all are removed again, or lead to what was `tried`. Returns the ledgers too.
@@ -80,7 +80,7 @@ def _added(
         fit = revised(claimed(fit))
         better = not fit.terms and fit.cost < nominal.cost - CRITERIA.evidence
         if better or effects(fit.terms) not in tried:
-            return _Added(fit, needed, {choice.named.fit.terms[-1].key: choice.rivals}), considered
+            return _GrownFit(fit, needed, {choice.named.fit.terms[-1].key: choice.rivals}), considered
         left = [one for one in left if one.fit.terms[-1].effect != effect]
         best = first_standing(left)
     return None, [*considered, *(one.considered for one in left)]
@@ -122,7 +122,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         additions = next_term(round_, screen_library(base), step)
         fitted = {one.fit.terms[-1].effect for one in additions.fits if not base.estimator.expired}
         considered += additions.considered
-        added, more = _added(additions, round_, nominal, tried)
+        added, more = _grown(additions, round_, nominal, tried)
         considered += more
         if added is None:
             factors = unexplained_channels(base)

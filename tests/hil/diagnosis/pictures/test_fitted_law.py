@@ -1,4 +1,4 @@
-"""Means of what is left of a law, and their errors."""
+"""Means of the residual of a law, and their errors."""
 
 import numpy as np
 import pytest

@@ -161,7 +161,7 @@ def test_a_wrong_law_does_not_run_through_its_points(effect: str) -> None:
 
 @pytest.mark.parametrize("effect", [one.id for one in LIBRARY if one.text.picture in LAWS])
 def test_the_drawn_law_is_what_the_twin_left_before(effect: str) -> None:
-    """Points are the law and what is left, so that the law itself is compared with the residual before.
+    """Points are the law and the residual, so that the law itself is compared with the residual before.
 
     The observer attenuates a quick torque, and most of its lateness.
     """
@@ -189,7 +189,7 @@ def test_a_cogging_of_many_periods_is_folded_on_one_beside_its_line() -> None:
     (curve,) = (line.get_xydata() for line in above.lines if line.get_label() == "fitted law")
     assert len(curve) >= 400
     assert np.ptp(curve[:, 0]) == pytest.approx(30.0)  # degrees, of 12 periods per turn
-    (after,) = (line for line in beside.lines if line.get_label() == "left after")
+    (after,) = (line for line in beside.lines if line.get_label() == "residual after")
     before = max(float(path.vertices[:, 1].max()) for one in beside.collections for path in one.get_paths())
     assert float(np.max(after.get_ydata())) < 0.05 * before
 

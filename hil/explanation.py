@@ -86,7 +86,8 @@ def explain(
     with rewritten_folder(folder / REPORT, PAGE) as part:
         diagnosis = diagnose(read, (), bench, progress, budget_s)
         progress("writing the report")
-        write_diagnosis(diagnosis, part, basis.assumed)
+        path = folder / BENCH
+        write_diagnosis(diagnosis, part, basis.assumed, path if is_file(path) else None)
     return Explanation(basis, diagnosis, folder / REPORT / PAGE)
 
 

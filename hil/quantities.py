@@ -128,6 +128,20 @@ def with_error(value: float, error: float) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
+def rounded_to_error(value: float, error: float) -> str:
+    """Number for a file, rounded at the second digit of its standard error, with at least two digits.
+
+    With six digits where no error is known.
+    """
+    if value == 0.0 or not (math.isfinite(error) and error > 0.0):
+        return f"{value:.6g}"
+    first, last = math.floor(math.log10(abs(value))), math.floor(math.log10(error)) - 1
+    further = min(max(first - last, 1), 11)  # a bit-identical replay has hardly an error
+    if 1e-3 <= abs(value) < 1e6:
+        return f"{round(value, further - first):.{max(further - first, 0)}f}"
+    return f"{value:.{further}e}"
+
+
 def quantity(value: float, unit: str) -> str:
     """Value of an SI unit as text with three digits, such as "24.7 µm"."""
     factor, shown = reading_unit(unit, value)

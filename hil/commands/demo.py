@@ -32,6 +32,7 @@ def demo(
     """Conceal an effect in the simulated axis, move it over CANopen, compare it with its twin, and find the effect."""
     import secrets
 
+    from hil.bench.bench_file import bench_path
     from hil.commands.warm_up import compile_kernels
     from hil.files.output import default_folder, new_folder
     from hil.loop.simulated_bench import load_simulated
@@ -60,7 +61,7 @@ def demo(
         with progress() as tell:
             diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))
             tell("writing the report", None)
-            write_diagnosis(diagnosis, part)
+            write_diagnosis(diagnosis, part, bench_file=bench_path("reference"), machine=truth)
     out.print(f"Diagnosis: {diagnosis.result.statement}\n")
     _say(diagnosis.result, truth, believed)
     out.print(

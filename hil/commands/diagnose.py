@@ -36,7 +36,7 @@ def diagnose(
     ] = BUDGET_S,
 ) -> None:
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
-    from hil.bench.bench_file import load_bench
+    from hil.bench.bench_file import bench_path, load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
     from hil.files.output import default_folder, new_folder
@@ -52,5 +52,5 @@ def diagnose(
     with new_folder(folder) as part, progress() as tell:
         diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
         tell("writing the report")
-        write_diagnosis(diagnosis, part)
+        write_diagnosis(diagnosis, part, bench_file=bench_path(bench) if bench else None)
     print_diagnosis(diagnosis.result, folder / "report.html")

@@ -45,6 +45,7 @@ def investigate(
     Designed motions stay within the travel and the limits of the recorded set-points and within drive.travel_m of the
     bench. On a real bench each one is shown and must be confirmed.
     """
+    from hil.bench.bench_file import bench_path
     from hil.commands.run import named, say
     from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.wording import title, titles
@@ -96,7 +97,7 @@ def investigate(
     found = investigate_bench(first, proving, loaded, folder, run, allowed, progress, rounds)
     with progress() as tell:
         tell("writing the report")
-        write_diagnosis(found.diagnosis, folder)
+        write_diagnosis(found.diagnosis, folder, bench_file=bench_path(bench))
     table(
         ("round", "motion", "found", "open"),
         [

@@ -107,12 +107,17 @@ def verdict(result: Comparison) -> str:
 
 def write_bench(bench: Bench, path: Path) -> None:
     """Write a bench as the YAML file that `load_bench` reads."""
+    write_text(path, bench_text(bench))
+
+
+def bench_text(bench: Bench) -> str:
+    """Text of a bench file, without what is as by default."""
     import yaml
 
     data = bench.model_dump(mode="json", exclude_defaults=True)
     data["schema_version"] = bench.schema_version
     data["axis"]["model"] = bench.axis.model
-    write_text(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
+    return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
 
 
 def _lead(result: Comparison) -> str:

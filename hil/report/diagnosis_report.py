@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from hil.bench.hardware import SimulationSection
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.experiment import NEXT_EXPERIMENT
 from hil.diagnosis.pictures.change import CAPTION
@@ -16,17 +17,24 @@ from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.motion.profile import write_profile
 from hil.quantities import digits, percent, reading_unit
-from hil.report.compare_report import write_bench
+from hil.report.diagnosed_bench import write_diagnosed_bench
 from hil.report.findings_section import findings_section
 from hil.report.fit_section import corrections_section, fit_section
 from hil.report.ledger_report import ledger_section
 from hil.report.page import Page
 
 
-def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] = ()) -> None:
+def write_diagnosis(
+    diagnosis: Diagnosis,
+    folder: Path,
+    assumed: Sequence[str] = (),
+    bench_file: Path | None = None,
+    machine: SimulationSection | None = None,
+) -> None:
     """Write diagnosis.json, report.html with its PNGs, bench.diagnosed.yaml and, if one helps, next_experiment.yaml.
 
     `assumed` of recordings and bench is told on the page, so that a reader can correct it.
+    `bench_file` is the owner's, whose comments stay; `machine` the simulated axis, if it is not that of the bench.
     """
     result = diagnosis.result
     names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))
@@ -70,11 +78,12 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str] =
         [
             *(note for note in result.notes if note != repeated),
             f"The diagnosis took {digits(result.runtime_s)} s.",
-            "bench.diagnosed.yaml is the bench with these parameters and findings, for every other command.",
+            "bench.diagnosed.yaml is the bench with these parameters and findings, for every other command; what is "
+            "doubtful is in its comments.",
         ]
     )
     write_json(folder / "diagnosis.json", result.as_json())
-    write_bench(diagnosis.bench, folder / "bench.diagnosed.yaml")
+    write_diagnosed_bench(diagnosis, folder / "bench.diagnosed.yaml", bench_file, machine)
     page.write(folder / "report.html")
 
 

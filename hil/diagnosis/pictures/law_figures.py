@@ -116,7 +116,13 @@ def _left(axis: Axes, along: float, found: Means, unit: str) -> None:
     factor, name = reading_unit(unit, float(np.abs(found.before).max()))
     axis.axhline(0.0, color="black", linewidth=0.8)
     axis.plot(
-        along * found.x, factor * found.before, "o-", color=COMMAND, markersize=3, linewidth=0.8, label="residual before"
+        along * found.x,
+        factor * found.before,
+        "o-",
+        color=COMMAND,
+        markersize=3,
+        linewidth=0.8,
+        label="residual before",
     )
     looks.points(axis, along * found.x, factor * found.after, factor * found.error)
     style_axis(axis, f"residual\n[{name}]")

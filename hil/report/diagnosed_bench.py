@@ -5,6 +5,7 @@ does not change: where the simulated axis takes values from `axis` that the diag
 written into it. So the next run moves the same machine as before, beside the better twin.
 """
 
+import json
 import textwrap
 from collections.abc import Sequence
 from contextlib import suppress
@@ -41,21 +42,20 @@ def write_diagnosed_bench(
     items, dropped = found_items(diagnosis), _dropped(diagnosis, given)
     values = changed_values(diagnosis, given)
     if items or dropped or any(one.value is not None for one in values):
-        values.append(YamlChange(("name",), f"{given.name.removesuffix('_diagnosed')}_diagnosed", ""))
+        name = f"{given.name.removesuffix('_diagnosed')}_diagnosed"
+        values.append(YamlChange(("name",), name if name.isidentifier() else json.dumps(name), ""))
     values += _of_machine(given, values, machine)
     expected = _expected(given, values, items, dropped)
     heading = _heading(diagnosis, given, items)
-    if source is not None:
-        try:
-            write_text(path, heading + _edited(source.read_text(encoding="utf-8"), values, items, dropped))
+    attempts = [(source.read_text(encoding="utf-8"), values, dropped)] if source else []
+    left = [one for one in values if one.path[:2] not in [(MECHANISMS, at) for at in dropped]]
+    attempts.append((bench_text(_expected(given, [], [], dropped)), [_moved(one, dropped) for one in left], []))
+    for text, changes, gone in attempts:
+        with suppress(ValueError, yaml.YAMLError, InputError):  # a layout that cannot be changed by lines
+            write_text(path, heading + _edited(text, changes, items, gone))
             if load_bench(path) == expected:
                 return
-        except (ValueError, yaml.YAMLError, InputError):
-            pass  # a layout that cannot be changed by lines
-    before = _expected(given, [], [], dropped)
-    values = [_moved(one, dropped) for one in values if one.path[:2] not in [(MECHANISMS, at) for at in dropped]]
-    write_text(path, heading + _edited(bench_text(before), values, items, []))
-    load_bench(path)
+    write_text(path, heading + bench_text(expected))
 
 
 def _edited(text: str, values: Sequence[YamlChange], items: Sequence[FoundItem], dropped: Sequence[int]) -> str:
@@ -78,8 +78,12 @@ def _expected(given: Bench, values: Sequence[YamlChange], items: Sequence[FoundI
             place = data
             for part in change.path[:-1]:
                 place = place[part]
-            plain = change.path[0] in ("name", "simulation")
-            place[change.path[-1]] = change.value if plain else _number(change.value, place[change.path[-1]])
+            key, value = change.path[-1], change.value
+            if key == "name":
+                value = yaml.safe_load(value)
+            elif change.path[0] != "simulation":
+                value = _number(value, place[key])
+            place[key] = value
     kept = [entry for at, entry in enumerate(data[MECHANISMS]) if at not in dropped]
     data[MECHANISMS] = [*kept, *(item.entry.model_dump() for item in items if not item.doubt)]
     return Bench.model_validate(data)
@@ -122,15 +126,20 @@ def _of_machine(given: Bench, values: Sequence[YamlChange], machine: SimulationS
     wanted = machine or before
     changed = [str(one.path[1]) for one in values if one.path[0] == "axis" and one.value is not None]
     former = {name: getattr(given.axis, name) for name in changed} | wanted.axis
-    after, now = wanted.model_copy(update={"axis": former}).model_dump(mode="json"), before.model_dump(mode="json")
-    changes = [YamlChange(("simulation", key), value, "") for key, value in after.items() if value != now[key]]
+    after = wanted.model_copy(update={"axis": former})
+    brief = after.model_dump(mode="json", exclude_defaults=True)
+    changes = [
+        YamlChange(("simulation", key), brief.get(key, value), "")
+        for key, value in after.model_dump(mode="json").items()
+        if value != before.model_dump(mode="json")[key]
+    ]
     return [YamlChange(("simulation",), None, STAND_IN), *changes]
 
 
 def _heading(diagnosis: Diagnosis, given: Bench, items: Sequence[FoundItem]) -> str:
     result = diagnosis.result
     names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))
-    lines = [f"Bench {given.name} after hil diagnose of {names}: {title(result.verdict)}. {result.statement}"]
+    lines = [f"Bench {given.name} after a diagnosis of {names}. {result.statement}"]
     lines.append(
         "Changed values have their standard error (+-), at whose second digit they are rounded, and the value before."
     )

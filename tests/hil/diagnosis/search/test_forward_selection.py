@@ -13,6 +13,7 @@ from hil.diagnosis.search.initial_values import claimable
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.terms import Term
+from hil.twin.library import BY_ID
 
 OWNER = bench()
 
@@ -39,3 +40,44 @@ def test_a_channel_is_set_aside_where_another_is_explained(ratios: dict[str, flo
     known = SimpleNamespace(exact_input=False, hidden=frozenset({"command"}))
     fit: Any = SimpleNamespace(noise_ratios=(ratios | {"command": 0.0},), data=SimpleNamespace(observability=known))
     assert forward_selection.unexplained_channels(fit) == pytest.approx(left)
+
+
+def test_a_term_that_is_removed_again_gives_its_place_to_the_next_that_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fit(*effects: str) -> Any:
+        terms = tuple(Term(effect, 0, (1.0,) * len(BY_ID[effect].names)) for effect in effects)
+        one = SimpleNamespace(terms=terms, cost=1.0, jacobian=None)
+        one.refit = lambda evaluations, slopes: one
+        return one
+
+    def addition(effect: str, stands: bool) -> Any:
+        ledger = (SimpleNamespace(accepted=True),)
+        return SimpleNamespace(fit=fit(effect), stands=stands, harmless=ledger, considered=f"ledger of {effect}")
+
+    first, refuted, second, third = (
+        addition("cogging_torque", True),
+        addition("backlash", False),
+        addition("torque_ripple", True),
+        addition("constant_load", True),
+    )
+    asked = list[str]()
+
+    def pruned(one: Any, reference: Any) -> Any:
+        """Remove the first term again, with its ledger."""
+        asked.append(one.terms[-1].effect)
+        return (fit(), {}, ["removed"]) if asked[-1] == "cogging_torque" else (one, {one.terms[-1].key: 9.0}, [])
+
+    monkeypatch.setattr(
+        forward_selection, "chosen", lambda best, left, round_: SimpleNamespace(considered=(), named=best, rivals=[])
+    )
+    monkeypatch.setattr(forward_selection, "_pruned", pruned)
+    monkeypatch.setattr(forward_selection, "_invalid", lambda one: [])
+    monkeypatch.setattr(forward_selection, "claimed", lambda one: one)
+    monkeypatch.setattr(forward_selection, "revised", lambda one: one)
+    additions: Any = SimpleNamespace(best=first, fits=[first, refuted, second, third])
+    round_: Any = SimpleNamespace(reference=None)
+    grown, considered = forward_selection._grown(additions, round_, fit(), [[]])
+    assert asked == ["cogging_torque", "torque_ripple"]
+    assert considered == ["removed"]
+    assert grown is not None
+    assert [term.effect for term in grown.fit.terms] == ["torque_ripple"]
+    assert list(grown.rivals) == list(grown.needed) == [second.fit.terms[-1].key]

@@ -59,7 +59,7 @@ def _change(path: FieldPath, before: object, after: object, told: Correction | N
         return YamlChange(path, after, f"by diagnosis; before {before}")
     unit = told.unit if told else unit_of(str(path[-1]))
     error = told.std if told else error
-    sure = f"+-{digits(error, 2)} {'' if unit == '1' else unit}".rstrip() if error else ""
+    sure = f"+-{error:.2g} {'' if unit == '1' else unit}".rstrip() if error else ""
     how = "by diagnosis" if told or path[-1] == DELAY else "fitted with the others, by itself not told"
     shown = f"{before:.6g}" if isinstance(before, float) else "0" if before is None else str(before)
     text = rounded_to_error(after, error)

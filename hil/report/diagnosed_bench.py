@@ -149,4 +149,4 @@ def _heading(diagnosis: Diagnosis, given: Bench, items: Sequence[FoundItem]) -> 
     if events:
         lines.append(f"Not in this file, as another recording has it not: {', '.join(map(title, events))}.")
     plain = ("".join(sign if sign.isprintable() else " " for sign in line) for line in lines)
-    return "".join(comment_lines(textwrap.fill(line, 110)) for line in plain)
+    return "".join(comment_lines(textwrap.fill(line, 110)) for line in plain) + "#\n"

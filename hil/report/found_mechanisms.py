@@ -87,4 +87,4 @@ def _value(diagnosis: Diagnosis, parameter: Parameter, value: float, error: floa
     text, unit = rounded_to_error(value, error), unit_in(diagnosis.given_bench, parameter)
     text = text if parameter.low <= float(text) <= parameter.high else repr(value)
     unit = "" if unit == "1" else unit
-    return text, f"+-{digits(error, 2)} {unit}".rstrip() if error else unit or "without unit"
+    return text, f"+-{error:.2g} {unit}".rstrip() if error else unit or "without unit"

@@ -19,7 +19,6 @@ from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.terms import Term
 from hil.loop.simulated_bench import load_simulated, true_axis
-from hil.quantities import digits
 from hil.report.diagnosed_bench import write_diagnosed_bench
 
 OWNER = load_bench("reference")
@@ -71,12 +70,12 @@ def test_comments_and_order_of_the_owner_are_kept(found: Diagnosis, tmp_path: Pa
 def test_a_changed_value_has_its_error_and_the_value_before(found: Diagnosis, tmp_path: Path) -> None:
     text, again = written(found, tmp_path)
     mass = found.result.parameter_corrections["table_mass_kg"]
-    assert f"+-{digits(mass.std, 2)} kg by diagnosis; before 384 " in line(text, "table_mass_kg")
+    assert f"+-{mass.std:.2g} kg by diagnosis; before 384 " in line(text, "table_mass_kg")
     shown = line(text, "table_mass_kg").split()[1]
     assert abs(float(shown) - mass.value) <= 0.05 * mass.std + 1e-12
     assert again.axis.model_dump()["table_mass_kg"] == float(shown)
     strength = found.result.missing[0].parameters["amplitude_n_m"]
-    assert f"+-{digits(strength.std, 2)} N m" in line(text, "amplitude_n_m")
+    assert f"+-{strength.std:.2g} N m" in line(text, "amplitude_n_m")
     assert "# found by diagnosis, " in text
     assert "x its standard error; confidence " in text
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.preparation.prepare import prepare
-from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone
+from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone, without_open_delay
 from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.stages import Judged, Prepared, Progress
@@ -45,6 +45,9 @@ def diagnose(
 
     def answer(prepared: Prepared) -> Judged:
         searched = search(prepared, progress, end_s)
+        if time.process_time() < end_s and (at_once := without_open_delay(searched)):
+            progress("searching again without a delay of the torque that is left open")
+            searched = search(at_once, progress, end_s)
         progress("testing on held-out recordings")
         return judge(test_on_held_out(searched))
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import AT_FLOOR, AxisChange, Correction, Finding, FitFigures, Result, Verdict
 from hil.diagnosis.wording import spoken, title
+from hil.identification.least_squares import SIGMAS
 from hil.identification.noise_floor import FLOOR
 from hil.quantities import percent, quantity
 
@@ -17,7 +18,8 @@ def statement(result: Result) -> str:
     if result.verdict is Verdict.MISSING_PHYSICS:
         return f"{_found('Missing physics', result.missing)} {_residual(result)}{_left(result)}"
     if result.verdict is Verdict.PARAMETER_ERROR:
-        worst = sorted(result.parameter_corrections.items(), key=lambda item: -_growth(item[1]))
+        sure = [item for item in result.parameter_corrections.items() if _sure(item[1])]
+        worst = sorted(sure, key=lambda item: -_growth(item[1]))
         changes = ", ".join(_changed(name, one) for name, one in worst[:3])
         if not changes:
             return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
@@ -97,6 +99,10 @@ def _of_axis(change: AxisChange, result: Result) -> str:
         f"No mechanism of the library explains the whole mismatch. Parameters that change {where} explain {share} of "
         f"it: {told}."
     )
+
+
+def _sure(one: Correction) -> bool:
+    return abs(one.value - one.nominal) > SIGMAS * one.std
 
 
 def _growth(one: Correction) -> float:

@@ -1,8 +1,9 @@
-"""Simpler twins for the same recordings: without the springs of the bench, and without its control law.
+"""Simpler twins for the same recordings: without the springs of the bench, its control law, or an open delay.
 
 Motor and table with a spring between them have a resonance. Where the recordings do not tell how the mass is split,
 nothing holds that resonance where it is, and the twin may miss the torque that one inertia predicts. A law that is
-nearly right says at which instants a torque acts; where it runs faster than the rows, they tell that better.
+nearly right says at which instants a torque acts; where it runs faster than the rows, they tell that better. A delay
+of the torque is left open for what a logger does within a row; one that ends at its bound is to be named.
 """
 
 from dataclasses import replace
@@ -12,7 +13,8 @@ from hil.bench.axis_models import Rigid
 from hil.bench.bench_file import Bench
 from hil.bench.turning_axes import Rotary
 from hil.diagnosis.preparation.usable_law import set_aside
-from hil.diagnosis.stages import Prepared
+from hil.diagnosis.stages import Prepared, Searched
+from hil.identification.coordinates import DELAY
 from hil.identification.dataset import prepare_dataset
 from hil.identification.residual_scales import inertia
 
@@ -47,6 +49,20 @@ def as_plant_alone(prepared: Prepared) -> Prepared | None:
     held_out = data.over(runs[len(prepared.train.runs) :])
     notes = (*prepared.notes, *law.notes)
     return replace(prepared, bench=bench, train=data, held_out=held_out, law=law, notes=notes)
+
+
+def without_open_delay(searched: Searched) -> Prepared | None:
+    """The recordings beside a twin whose torque acts at once, where the search left its delay at the bound; else None.
+
+    A delay given in the bench file stays.
+    """
+    prepared = searched.prepared
+    if DELAY not in searched.final.at_bound or prepared.law.bench.torque_delay_s is not None:
+        return None
+    control = prepared.bench.control.model_copy(update={DELAY: None})
+    bench = prepared.bench.model_copy(update={"control": control})
+    data = prepare_dataset(prepared.train.runs, bench)
+    return replace(prepared, bench=bench, train=data, held_out=data.over(prepared.held_out.runs))
 
 
 def rigid(bench: Bench) -> Bench:

@@ -36,7 +36,7 @@ from hil.identification.inference import standard_errors
 from hil.identification.least_squares import SIGMAS
 from hil.identification.noise_floor import FLOOR
 from hil.identification.terms import Term
-from hil.quantities import digits
+from hil.quantities import digits, quantity, unit_of
 from hil.twin.library import BY_ID
 
 
@@ -91,10 +91,13 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
 
 
 def _in_bench(final: Fit) -> str:
-    """Mechanisms of the bench, as a draft has them, whose strength these recordings tell; empty without."""
+    """Springs and mechanisms of the bench, as a draft has them, that these recordings tell; empty without."""
     hypothesis = final.hypothesis
     errors = dict(zip(hypothesis.nominal, standard_errors(final), strict=False))
-    told = list[str]()
+    axis, told = final.bench.axis, list[str]()
+    for name in axis.SPRINGS:
+        if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
+            told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
     for entry in (one.active() for one in hypothesis.kept):
         mechanism = BY_ID[entry.effect]
         name = f"{entry.effect}.{mechanism.parameters[mechanism.strength].name}"

@@ -92,6 +92,20 @@ def orders(
     return list(dict.fromkeys((*best, *beside, 1.0, 2.0)))
 
 
+def fine_orders(runs: Sequence[Measured], disturbances: Sequence[Disturbance], angle_per_unit: float) -> list[float]:
+    """The order above all of `orders` with the largest disturbance, as of a gear in front of the encoder; or none."""
+    turns = [angle_per_unit * run.motor[d.sliding] / (2.0 * np.pi) for run, d in zip(runs, disturbances, strict=True)]
+    rates = np.concatenate([np.abs(d.velocity[d.sliding]) for d in disturbances]) * angle_per_unit / (2.0 * np.pi)
+    if not rates.size or not np.any(rates):
+        return []
+    longest, shortest = 1.0 / float(_ORDERS[-1]), float(np.median(rates)) / _PASS_HZ
+    if shortest >= longest:
+        return []
+    torque = np.concatenate([d.torque[d.sliding] for d in disturbances])
+    found = strongest_periods(np.concatenate(turns), torque, shortest / 4.0, shortest, 1, longest)
+    return [1.0 / period for period in found]
+
+
 def friction_periods(
     runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float, most: int = 4
 ) -> list[float]:

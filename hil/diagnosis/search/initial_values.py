@@ -135,6 +135,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     periods = estimate.friction_periods(runs, disturbances, ratio)
     if physics.turn_known:
         orders = estimate.orders(runs, disturbances, physics.angle_per_unit)
+        orders += estimate.fine_orders(runs, disturbances, physics.angle_per_unit)
     else:
         orders = estimate.waves(runs, disturbances, ratio)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]

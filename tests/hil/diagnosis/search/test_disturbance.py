@@ -10,7 +10,7 @@ import pytest
 from concealed_run import concealed_run
 from diagnosis_runs import bench
 
-from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz, scale_periods
+from hil.diagnosis.search.disturbance import Disturbance, fine_orders, friction_zones, lines_hz, scale_periods
 from hil.identification.measured import take
 
 OWNER = bench()
@@ -48,3 +48,16 @@ def test_a_short_period_of_the_second_encoder_is_found_beside_long_errors_that_a
     long = sum(20e-6 * np.sin(2.0 * np.pi * (n + 0.37) * x / np.ptp(x)) for n in range(1, 7))
     found = scale_periods([run], [long + 3e-6 * np.sin(2.0 * np.pi * x / 20e-6)])
     assert found[0] == pytest.approx(20e-6, rel=1e-3)
+
+
+def test_a_ripple_finer_than_160_per_turn_is_found_within_less_than_a_turn() -> None:
+    t = np.arange(20_000) * 2e-3
+    angle = 1.2 * np.sin(0.9 * t)  # rad: an output shaft behind a gear of 100
+    velocity = np.gradient(angle, 2e-3)
+    noise = np.random.default_rng(3).normal(0.0, 1.0, t.size)
+    ripple = Disturbance(np.sin(200.0 * angle) + noise, velocity, np.abs(velocity) > 0.05)
+    run = SimpleNamespace(motor=angle, period_s=2e-3)
+    (order,) = fine_orders([run], [ripple], 1.0)
+    assert order == pytest.approx(200.0, abs=0.7)
+    still = Disturbance(noise, np.zeros(t.size), np.zeros(t.size, dtype=bool))
+    assert fine_orders([run], [still], 1.0) == []

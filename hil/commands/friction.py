@@ -17,7 +17,7 @@ def friction(
     ] = None,
     bench: Annotated[str | None, typer.Option(help="Bench file or name of a shipped bench.")] = None,
     profile: Annotated[
-        Path | None, typer.Option(help="Feed sweep to run, such as profiles/friction_sweep.yaml.")
+        Path | None, typer.Option(help="Feed sweep to run, or name of a shipped profile: friction_sweep.")
     ] = None,
     virtual: Annotated[
         bool, typer.Option("--virtual", help="Simulated bench: run --profile as fast as possible.")

@@ -21,7 +21,7 @@ def investigate(
     profiles: Annotated[
         list[Path],
         typer.Argument(
-            metavar="PROFILE...", show_default=False, help="First profiles, such as profiles/identification.yaml."
+            metavar="PROFILE...", show_default=False, help="First profiles: files or shipped ones: identification."
         ),
     ],
     bench: RunBench = "reference",

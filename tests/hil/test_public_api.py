@@ -138,7 +138,9 @@ def test_no_module_hides_a_verb() -> None:
 
 def test_the_version_is_one_everywhere() -> None:
     assert hil.__version__ == version("hil-servo")
-    assert CliRunner().invoke(app, ["--version"]).output == f"hil-servo {hil.__version__}\n"
+    printed = CliRunner().invoke(app, ["--version"]).output
+    # after the release the state of the repository, as v0.4.0-12-g1234abc
+    assert re.fullmatch(rf"hil-servo {re.escape(hil.__version__)}( \(\S*[0-9a-f]{{7,}}(, changed)?\))?\n", printed)
 
 
 @pytest.fixture(scope="module")

@@ -72,7 +72,7 @@ def _print_version(wanted: bool) -> None:
 def _options(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Print release and commit, and exit.", callback=_print_version, is_eager=True),
+        typer.Option("--version", help="Print release and commit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
     """Options of the program itself."""

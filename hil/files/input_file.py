@@ -114,7 +114,8 @@ def bounded(read: Callable[Concatenate[Name, Given], Read]) -> Callable[Concaten
     """Mark a function that reads the file of its first argument: it ends with InputError above time or memory.
 
     It looks at both in a timer of processor time, which only the main thread of a process has, and Windows does not
-    have; inside another marked function the outer one looks. Libraries that catch all exceptions are interrupted again at the next look.
+    have; inside another marked function the outer one looks. Libraries that catch all exceptions are interrupted again
+    at the next look.
     """
 
     @functools.wraps(read)

@@ -18,11 +18,10 @@ def shipped_files(kind: Shipped) -> dict[str, Path]:
 
 
 def given_or_shipped(source: str | Path, kind: Shipped) -> Path:
-    """Return the path as it is given, or the file of a shipped name. Raises InputError for an unknown name."""
-    path = Path(source)
-    if path.suffix in (".yaml", ".yml") or is_file(path):
-        return path
-    shipped = shipped_files(kind)
-    if str(source) not in shipped:
+    """Return the file of a shipped name, or the path as it is given. Raises InputError for what is neither."""
+    path, shipped = Path(source), shipped_files(kind)
+    if str(source) in shipped:
+        return shipped[str(source)]
+    if path.suffix not in (".yaml", ".yml") and not is_file(path):
         raise InputError(f"{source}: no such {kind}; give a .yaml file or one of {', '.join(shipped)}")
-    return shipped[str(source)]
+    return path

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from own_recordings import COGGING_LEARN, COGGING_PROVE
 from processes import DEADLINE_S
 from typer.testing import CliRunner
@@ -242,8 +241,6 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     lines = [line for line in block.splitlines() if line.strip()]
     assert len(lines) <= 12
     assert sum("diagnose" in line or "diagnosis" in line for line in lines) <= 3
-    shorter = yaml.safe_dump(MOVE.model_dump(mode="json", exclude_none=True))
-    (tmp_path / "reference").write_text(shorter)  # a file goes before the shipped profile of its name
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     exec("\n".join(line for line in lines if "diagnos" not in line and ".plot(" not in line), names)

@@ -15,15 +15,14 @@ from processes import DEADLINE_S
 
 ROOT = Path(__file__).parents[2]
 OF_LINUX = ("hil.loop", "hil.recording", "hil.scope", "hil.investigation", "hil.validation.benchmarks")
-WITHOUT = r"""
+WITHOUT = r'''
 import importlib, json, os, pkgutil, signal, sys
 from importlib.abc import MetaPathFinder
 
-for name in ("can.interfaces.virtual", "can.interfaces.udp_multicast.utils", "canopen", "serial", "numba",
-             "pyarrow.csv", "pyarrow.parquet", "scipy.signal", "scipy.stats", "scipy.optimize", "scipy.io",
-             "matplotlib.figure", "bokeh.plotting", "bokeh.layouts", "jinja2", "pydantic", "typer", "rich.table", "rich.console", "ruckig",
-             "threadpoolctl", "yaml", "uvicorn", "starlette.staticfiles", "subprocess", "multiprocessing", "asyncio",
-             "concurrent.futures.process", "tempfile", "shutil"):
+for name in """can.interfaces.virtual can.interfaces.udp_multicast.utils canopen serial numba pyarrow.csv
+        pyarrow.parquet scipy.signal scipy.stats scipy.optimize scipy.io matplotlib.figure bokeh.plotting bokeh.layouts jinja2
+        pydantic typer rich.table rich.console ruckig threadpoolctl yaml uvicorn starlette.staticfiles subprocess
+        multiprocessing asyncio concurrent.futures.process tempfile shutil""".split():
     importlib.import_module(name)
 
 class Missing(MetaPathFinder):
@@ -49,7 +48,7 @@ for name in names:
     except Exception as error:
         failed[name] = f"{type(error).__name__}: {error}"
 print(json.dumps([len(names), failed, len(hil.read_recording(sys.argv[1]))]))
-"""
+'''
 
 
 def test_all_but_loop_recorder_and_scope_imports_without_the_modules_of_linux() -> None:

@@ -20,8 +20,8 @@ import importlib, json, os, pkgutil, signal, sys
 from importlib.abc import MetaPathFinder
 
 for name in """can.interfaces.virtual can.interfaces.udp_multicast.utils canopen serial numba pyarrow.csv
-        pyarrow.parquet scipy.signal scipy.stats scipy.optimize scipy.io matplotlib.figure bokeh.plotting bokeh.layouts jinja2
-        pydantic typer rich.table rich.console ruckig threadpoolctl yaml uvicorn starlette.staticfiles subprocess
+        pyarrow.parquet scipy.signal scipy.stats scipy.optimize scipy.io matplotlib.figure bokeh.plotting bokeh.layouts
+        jinja2 pydantic typer rich.table rich.console ruckig threadpoolctl yaml uvicorn starlette.staticfiles subprocess
         multiprocessing asyncio concurrent.futures.process tempfile shutil""".split():
     importlib.import_module(name)
 

@@ -6,7 +6,7 @@ use (PEP 562), so that `import hil` itself loads neither numpy nor scipy:
     import hil
 
     bench = hil.load_bench("reference")
-    trajectory = hil.plan(hil.load_profile("profiles/reference.yaml"), bench.period_s)
+    trajectory = hil.plan(hil.load_profile("reference"), bench.period_s)
     recording = hil.simulate(bench, trajectory)
     print(hil.compare(recording, bench))
     print(hil.diagnose(recording, bench))

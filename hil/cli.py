@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from hil import __version__
 from hil.commands.bench import bench
 from hil.commands.compare import compare
 from hil.commands.demo import demo
@@ -38,25 +38,41 @@ from hil.commands.validate import validate
 from hil.commands.warm_up import warm_up
 from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.errors import HilError
+from hil.files.optional_library import how_to_install
 
+
+class _Commands(TyperGroup):
+    """The commands with the whole first paragraph of their help, which click would cut to one line."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        rows = [(name, " ".join((one.help or "").split("\n\n")[0].split())) for name, one in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+# Without Rich's markup: it would eat words in square brackets, such as [m], and its import takes 0.2 s.
 app = typer.Typer(
+    cls=_Commands,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    rich_markup_mode=None,
     help="Servo bench: real-time control, digital twin, comparison and diagnosis of recordings.",
 )
 
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        print(f"hil-servo {__version__}")
+        from hil.commands.version import version_line
+
+        print(version_line())
         raise typer.Exit
 
 
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", help="Print the version and exit", callback=_print_version, is_eager=True)
+        bool,
+        typer.Option("--version", help="Print release and commit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
     """Options of the program itself."""
@@ -112,6 +128,11 @@ def main() -> None:
     except KeyboardInterrupt:
         print("stopped by ctrl-C", file=sys.stderr)
         sys.exit(130)
+    except ModuleNotFoundError as error:
+        if not (told := how_to_install(error)):
+            raise
+        print(told, file=sys.stderr)
+        sys.exit(2)
     except OSError as error:
         if error.errno in (errno.ENAMETOOLONG, errno.EACCES, errno.ELOOP, errno.ENOTDIR) and error.filename:
             print(f"{error.filename}: cannot be used ({error.strerror}); give another path", file=sys.stderr)

@@ -64,13 +64,16 @@ def explain(
     axis: str | None = None,
     progress: Callable[[str], None] = lambda text: None,
     first: Callable[[Basis], None] = lambda basis: None,
+    answer: Callable[[Diagnosis], None] = lambda diagnosis: None,
     budget_s: float = BUDGET_S,
 ) -> Explanation:
     """Read the recordings of one axis, draft what the folder lacks, diagnose, and write the page.
 
     `rate_hz`: rows per second of files without time stamps, `axis`: that of files with several. `progress` gets each
-    step, `first` what is known before the search. Raises InputError for a file that cannot be read, with the lines of
-    its map that the user must complete, and for recordings that cannot be diagnosed.
+    step, `first` what is known before the search, `answer` the diagnosis before its page is drawn.
+
+    Raises InputError for a file that cannot be read, with the lines of its map that the user must complete, and for
+    recordings that cannot be diagnosed.
     """
     read = list[Recording]()
     assumed = list[str]()
@@ -85,6 +88,7 @@ def explain(
     first(basis)
     with rewritten_folder(folder / REPORT, PAGE) as part:
         diagnosis = diagnose(read, (), bench, progress, budget_s)
+        answer(diagnosis)
         progress("writing the report")
         path = folder / BENCH
         write_diagnosis(diagnosis, part, basis.assumed, path if is_file(path) else None)

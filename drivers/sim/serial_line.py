@@ -5,7 +5,6 @@ The caller sends each position with `send`. For fault injection, `put` sends any
 """
 
 import os
-import tty
 
 from drivers.port import PlantLike
 from drivers.serial_encoder import SerialFormat
@@ -18,6 +17,8 @@ class SimulatedSerialEncoder:
     def __init__(
         self, plant: PlantLike, *, step_m: float = 0.5e-6, format: SerialFormat = SerialFormat.BINARY, bits: int = 64
     ) -> None:
+        import tty  # POSIX only; without a serial line the simulated axis runs elsewhere too
+
         self.plant, self._step_m, self._format = plant, step_m, format
         self._half = 1 << (bits - 1)
         self._sequence = 0

@@ -6,7 +6,6 @@ An axis file (the keys of `axis` at the top level, and `control`) is a bench too
 """
 
 import math
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -17,7 +16,8 @@ from hil.bench.axis_models import Axis, OneMass, model_of
 from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
 from hil.bench.hardware import DriveMode, DriveSection, SimulationSection
 from hil.control import cascade as law
-from hil.errors import FieldError, InputError
+from hil.errors import FieldError
+from hil.files.shipped import given_or_shipped
 from hil.files.yaml_model import load_model
 from hil.twin.axis import Twin
 from hil.twin.library import BY_ID
@@ -213,28 +213,11 @@ def _tuples(data: Any) -> Any:
     return tuple(_tuples(value) for value in data) if isinstance(data, list) else data
 
 
-def shipped_benches() -> dict[str, Path]:
-    """Name -> file of the benches that come with the package."""
-    folder = Path(str(resources.files("hil"))) / "benches"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
-
-
-def bench_path(source: str | Path) -> Path:
-    """Return the file of a bench from a path or a shipped name. Raises InputError for an unknown name."""
-    path = Path(source)
-    if path.suffix in (".yaml", ".yml"):
-        return path
-    shipped = shipped_benches()
-    if str(source) not in shipped:
-        raise InputError(f"{source}: no such bench; give a .yaml file or one of {', '.join(shipped)}")
-    return shipped[str(source)]
-
-
 def load_bench(source: str | Path) -> Bench:
     """Load a bench file, or a shipped bench by its name.
 
     Raises InputError with file, line, field, what was given and what is allowed.
     """
-    path = bench_path(source)
+    path = given_or_shipped(source, "bench")
     bench = load_model(path, Bench)
     return bench if bench.name else bench.model_copy(update={"name": path.stem})

@@ -20,6 +20,7 @@ def compare(
     from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
+    from hil.files.optional_library import page_line
     from hil.files.output import default_folder, new_folder
     from hil.identification.compare import Comparison
     from hil.identification.compare import compare as compare_recording
@@ -55,4 +56,4 @@ def compare(
         if result.fit is not None:
             out.print()
             table(PARAMETER_HEADERS, parameter_rows(result.fit))
-        out.print(f"\n{verdict(result)}\n\nReport: {page}")
+        out.print(f"\n{verdict(result)}\n\n{page_line(page)}")

@@ -32,9 +32,10 @@ def demo(
     """Conceal an effect in the simulated axis, move it over CANopen, compare it with its twin, and find the effect."""
     import secrets
 
-    from hil.bench.bench_file import bench_path
     from hil.commands.warm_up import compile_kernels
+    from hil.files.optional_library import missing_of, page_line
     from hil.files.output import default_folder, new_folder
+    from hil.files.shipped import shipped_files
     from hil.loop.simulated_bench import load_simulated
     from hil.validation.proof.draw import demo as concealed
 
@@ -54,20 +55,22 @@ def demo(
         learn, prove = _record(bench, part, virtual)
         with progress() as tell:
             comparison = compare(learn, believed, progress=tell)
-            tell("writing the comparison", None)
-            write_comparison(comparison, part)
         table(("measured - twin of the bench file", "rms", "largest", "relative"), rows_of(comparison))
         out.print(f"\n{verdict(comparison)}\n")
         with progress() as tell:
             diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))
-            tell("writing the report", None)
-            write_diagnosis(diagnosis, part, bench_file=bench_path("reference"), machine=truth)
-    out.print(f"Diagnosis: {diagnosis.result.statement}\n")
-    _say(diagnosis.result, truth, believed)
+        out.print(f"Diagnosis: {diagnosis.result.statement}\n")
+        _say(diagnosis.result, truth, believed)
+        with progress() as tell:  # pages last: their libraries take seconds to load
+            tell("writing the reports", None)
+            write_comparison(comparison, part)
+            write_diagnosis(diagnosis, part, bench_file=shipped_files("bench")["reference"], machine=truth)
+    out.print(f"\nThe same again: hil demo --seed {seed}" + (f" --effect {effect}" if effect else ""))
+    if missing_of("report"):
+        out.print(page_line(folder))
+        return
     out.print(
-        f"\nThe same again: hil demo --seed {seed}"
-        + (f" --effect {effect}" if effect else "")
-        + "\nOpen these files in a browser:"
+        "Open these files in a browser:"
         f"\n  the difference: {(folder / 'compare.html').resolve()}"
         f"\n  its cause:      {(folder / 'report.html').resolve()}"
     )

@@ -8,7 +8,7 @@ import typer
 from hil.commands.options import Out, RecordedBench
 from hil.commands.runs import read_run
 from hil.diagnosis.time_left import BUDGET_S
-from hil.report.console import progress
+from hil.report.console import out, progress
 
 
 def diagnose(
@@ -36,10 +36,12 @@ def diagnose(
     ] = BUDGET_S,
 ) -> None:
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
-    from hil.bench.bench_file import bench_path, load_bench
+    from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
+    from hil.files.optional_library import page_line
     from hil.files.output import default_folder, new_folder
+    from hil.files.shipped import given_or_shipped
     from hil.identification.measured import bench_of
     from hil.report.diagnosis_report import write_diagnosis
     from hil.report.summary import print_diagnosis
@@ -49,8 +51,11 @@ def diagnose(
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
     compile_kernels()
-    with new_folder(folder) as part, progress() as tell:
-        diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
-        tell("writing the report")
-        write_diagnosis(diagnosis, part, bench_file=bench_path(bench) if bench else None)
-    print_diagnosis(diagnosis.result, folder / "report.html")
+    with new_folder(folder) as part:
+        with progress() as tell:
+            diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
+        print_diagnosis(diagnosis.result)
+        with progress() as tell:
+            tell("writing the report")
+            write_diagnosis(diagnosis, part, bench_file=given_or_shipped(bench, "bench") if bench else None)
+    out.print(page_line(folder / "report.html"))

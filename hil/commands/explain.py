@@ -42,16 +42,24 @@ def explain(
     """
     from hil.commands.warm_up import compile_kernels
     from hil.explanation import explain as explain_files
+    from hil.files.optional_library import page_line
     from hil.report.summary import print_diagnosis
 
     compile_kernels()
     folder = folder or Path(f"explained-{data[0].stem}")
     with progress() as tell:
         found = explain_files(
-            data, folder, rate_hz=rate_hz, axis=axis, progress=tell, first=_first_answer, budget_s=budget_s
+            data,
+            folder,
+            rate_hz=rate_hz,
+            axis=axis,
+            progress=tell,
+            first=_first_answer,
+            answer=lambda diagnosis: print_diagnosis(diagnosis.result),
+            budget_s=budget_s,
         )
-    print_diagnosis(found.diagnosis.result, found.report)
-    if show:
+    out.print(page_line(found.report))
+    if show and found.report.exists():
         import webbrowser
 
         webbrowser.open(found.report.resolve().as_uri())

@@ -17,7 +17,7 @@ def friction(
     ] = None,
     bench: Annotated[str | None, typer.Option(help="Bench file or name of a shipped bench.")] = None,
     profile: Annotated[
-        Path | None, typer.Option(help="Feed sweep to run, such as profiles/friction_sweep.yaml.")
+        Path | None, typer.Option(help="Feed sweep to run, or name of a shipped profile: friction_sweep.")
     ] = None,
     virtual: Annotated[
         bool, typer.Option("--virtual", help="Simulated bench: run --profile as fast as possible.")
@@ -28,6 +28,7 @@ def friction(
     from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.errors import InputError
+    from hil.files.optional_library import page_line
     from hil.files.output import default_folder, new_folder
     from hil.identification.friction import identify_friction
     from hil.identification.measured import bench_of
@@ -59,7 +60,7 @@ def friction(
         result = identify_friction(recording)
         write_friction(result, recording.name, believed, part)
     table(("", "value", "standard error", "bench file"), rows_of(result, believed))
-    out.print(f"\n{verdict(result, believed)}\n\nReport: {folder / 'friction.html'}")
+    out.print(f"\n{verdict(result, believed)}\n\n{page_line(folder / 'friction.html')}")
 
 
 def _run(bench: str, profile: Path, folder: Path, virtual: bool) -> Path:

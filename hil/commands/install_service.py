@@ -28,7 +28,9 @@ RESTART_S = 0.1
 
 def install_service(
     bench: Annotated[str, typer.Argument(help="Bench file or name of a shipped bench.", show_default=False)],
-    profile: Annotated[Path, typer.Option(help="Profile that the service runs.", show_default=False)],
+    profile: Annotated[
+        Path, typer.Option(help="Profile that the service runs: file or shipped name.", show_default=False)
+    ],
     name: Annotated[str, typer.Option(help="Name of the service. Default: the bench's name.")] = "",
     cores: Annotated[
         str, typer.Option(help="Cores of the service, as 2-3; the loop takes an isolated one or the last of them.")
@@ -38,16 +40,17 @@ def install_service(
 ) -> None:
     """Write a systemd service hil-bench@NAME that runs a profile on a bench, and the CAN interface it needs."""
     from drivers.eds_text import decode, read_bytes
-    from hil.bench.bench_file import bench_path
     from hil.errors import FieldError, InputError
     from hil.files.output import write_text
+    from hil.files.shipped import given_or_shipped
     from hil.files.yaml_model import located
     from hil.loop.devices import check_runnable
     from hil.loop.eds_files import check_eds_files
     from hil.loop.simulated_bench import load_simulated
     from hil.motion.profile import load_profile
 
-    loaded, source = load_simulated(bench), bench_path(bench)
+    loaded, source = load_simulated(bench), given_or_shipped(bench, "bench")
+    profile = given_or_shipped(profile, "profile")
     load_profile(profile)
     name = name or loaded.name
     if not _NAME.fullmatch(name):

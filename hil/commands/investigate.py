@@ -21,7 +21,7 @@ def investigate(
     profiles: Annotated[
         list[Path],
         typer.Argument(
-            metavar="PROFILE...", show_default=False, help="First profiles, such as profiles/identification.yaml."
+            metavar="PROFILE...", show_default=False, help="First profiles: files or shipped ones: identification."
         ),
     ],
     bench: RunBench = "reference",
@@ -45,12 +45,13 @@ def investigate(
     Designed motions stay within the travel and the limits of the recorded set-points and within drive.travel_m of the
     bench. On a real bench each one is shown and must be confirmed.
     """
-    from hil.bench.bench_file import bench_path
     from hil.commands.run import named, say
     from hil.commands.warm_up import compile_kernels
     from hil.diagnosis.wording import title, titles
     from hil.errors import InputError
+    from hil.files.optional_library import page_line
     from hil.files.output import default_folder, refuse_used
+    from hil.files.shipped import given_or_shipped
     from hil.investigation import investigate as investigate_bench
     from hil.loop.run import run_profile
     from hil.loop.simulated_bench import load_simulated
@@ -97,7 +98,7 @@ def investigate(
     found = investigate_bench(first, proving, loaded, folder, run, allowed, progress, rounds)
     with progress() as tell:
         tell("writing the report")
-        write_diagnosis(found.diagnosis, folder, bench_file=bench_path(bench))
+        write_diagnosis(found.diagnosis, folder, bench_file=given_or_shipped(bench, "bench"))
     table(
         ("round", "motion", "found", "open"),
         [
@@ -111,7 +112,7 @@ def investigate(
             for number, one in enumerate(found.rounds, 1)
         ],
     )
-    out.print(f"\n{found.diagnosis.result.statement}\n\n{found.ended}\n\nReport: {folder / 'report.html'}")
+    out.print(f"\n{found.diagnosis.result.statement}\n\n{found.ended}\n\n{page_line(folder / 'report.html')}")
 
 
 def _confirmed(profile: Profile, period_s: float) -> bool:

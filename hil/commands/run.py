@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def run(
-    profile: Annotated[Path, typer.Argument(help="Profile file, such as profiles/reference.yaml.", show_default=False)],
+    profile: Annotated[
+        Path, typer.Argument(help="Profile file, or name of a shipped profile: reference, jog, ...", show_default=False)
+    ],
     bench: RunBench = "reference",
     virtual: Virtual = False,
     force: Force = False,
@@ -78,15 +80,17 @@ def run(
 @contextmanager
 def named(bench: str, profile: Path) -> Iterator[None]:
     """Name file and line in an error at a field of the bench or the profile."""
-    from hil.bench.bench_file import bench_path
     from hil.errors import FieldError
+    from hil.files.shipped import given_or_shipped
     from hil.files.yaml_model import located
     from hil.motion.profile import Profile
 
     try:
         yield
     except FieldError as error:
-        raise located(profile if error.field[0] in Profile.model_fields else bench_path(bench), error) from None
+        of_profile = error.field[0] in Profile.model_fields
+        path = given_or_shipped(profile, "profile") if of_profile else given_or_shipped(bench, "bench")
+        raise located(path, error) from None
 
 
 def say(result: RunResult, virtual: bool) -> None:

@@ -38,14 +38,10 @@ def scope(
 
     from hil.commands.runs import read_run
     from hil.errors import InputError
-
-    try:
-        from hil.scope.server import ScopeServer, address, bound, is_loopback, serve
-    except ModuleNotFoundError as error:
-        raise InputError(f"hil scope needs {error.name}: pip install 'hil-servo[scope]'") from None
     from hil.scope.live import LiveRing
     from hil.scope.page_session import PageSession
     from hil.scope.rows import FixedRows
+    from hil.scope.server import ScopeServer, address, bound, is_loopback, serve
 
     given = recordings or []
     if len(given) > 2:

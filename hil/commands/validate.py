@@ -49,24 +49,32 @@ def _checked(path: Path) -> str:
     """Describe a file: by its keys a profile, a map, else a bench. Raises InputError."""
     from pydantic import BaseModel, ConfigDict
 
-    from hil.errors import FieldError
-    from hil.files.yaml_model import load_model, located
-    from hil.importing.map_file import RecordingMap
-    from hil.loop.devices import check_runnable
-    from hil.loop.eds_files import check_eds_files
-    from hil.loop.simulated_bench import load_simulated
-    from hil.motion.profile import load_profile
+    from hil.files.yaml_model import load_model
 
     class AnyFile(BaseModel):
         model_config = ConfigDict(extra="allow")
 
     keys = load_model(path, AnyFile).model_extra or {}
     if keys.keys() & {"segments", "limits"}:
+        from hil.motion.profile import load_profile
+
         profile = load_profile(path)
         duration_s = sum(profile.slots(run.move) for run in profile.runs) * profile.grid_s
         return f"a profile of {len(profile.runs)} moves, {duration_s:.1f} s"
     if "channels" in keys:
+        from hil.importing.map_file import RecordingMap
+
         return f"a map of {len(load_model(path, RecordingMap).channels)} channels"
+    return _checked_bench(path)
+
+
+def _checked_bench(path: Path) -> str:
+    from hil.errors import FieldError
+    from hil.files.yaml_model import located
+    from hil.loop.devices import check_runnable
+    from hil.loop.eds_files import check_eds_files
+    from hil.loop.simulated_bench import load_simulated
+
     bench = load_simulated(path)
     if bench.drive is not None or bench.simulation is not None:  # with neither it describes recordings only
         try:

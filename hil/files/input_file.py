@@ -8,14 +8,14 @@ which it can interrupt; the first holds what libraries do in one call.
 
 import functools
 import itertools
-import resource
 import signal
 import stat
 import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from mmap import PAGESIZE
 from pathlib import Path
 from types import FrameType
 from typing import Concatenate, ParamSpec, TextIO, TypeVar
@@ -113,13 +113,15 @@ def parsing(path: Path, what: str, advice: str = "it is cut or damaged") -> Iter
 def bounded(read: Callable[Concatenate[Name, Given], Read]) -> Callable[Concatenate[Name, Given], Read]:
     """Mark a function that reads the file of its first argument: it ends with InputError above time or memory.
 
-    It looks at both in a timer of processor time, which only the main thread of a process has; inside another marked
-    function the outer one looks. Libraries that catch all exceptions are interrupted again at the next look.
+    It looks at both in a timer of processor time, which only the main thread of a process has, and Windows does not
+    have; inside another marked function the outer one looks. Libraries that catch all exceptions are interrupted again
+    at the next look.
     """
 
     @functools.wraps(read)
     def within(path: Name, /, *args: Given.args, **kwargs: Given.kwargs) -> Read:
-        if threading.current_thread() is not threading.main_thread() or any(signal.getitimer(signal.ITIMER_VIRTUAL)):
+        timed = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
+        if not timed or any(signal.getitimer(signal.ITIMER_VIRTUAL)):
             return read(path, *args, **kwargs)
         start_s, start_bytes, exceeded = time.process_time(), _resident(), ""
 
@@ -158,6 +160,7 @@ class _Exceeded(BaseException):
 
 
 def _resident() -> int:
-    """Memory of this process [bytes]."""
-    with open("/proc/self/statm", "rb") as file:
-        return int(file.read().split()[1]) * resource.getpagesize()
+    """Memory of this process [bytes]; 0 where the system does not tell, as macOS."""
+    with suppress(FileNotFoundError), open("/proc/self/statm", "rb") as file:
+        return int(file.read().split()[1]) * PAGESIZE
+    return 0

@@ -114,7 +114,7 @@ def identify_friction(
         raise InputError(
             f"{recording.name}: velocity_command_m_s: given {forward} forward and {backward} backward stretches of "
             f"constant feed, allowed 4 or more of different feeds and both directions, each longer than "
-            f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record profiles/friction_sweep.yaml"
+            f"{settling_s + ENDING_S + AVERAGED_MIN_S:g} s; record the profile friction_sweep"
         )
     columns = {"coulomb": np.sign(speed), "viscous": speed, "offset": np.ones_like(speed)}
     fit = least_squares(columns, torque, blocks=0)  # the means of separate stretches are independent

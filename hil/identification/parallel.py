@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar, cast
@@ -12,8 +13,10 @@ Output = TypeVar("Output")
 Function = TypeVar("Function", bound=Callable[..., Any])
 # HIL_THREADS: where the cores that this process may use are not its own, as on a cluster
 _ARENA_MAX = -8  # M_ARENA_MAX of mallopt(3)
-THREADS = int(os.environ.get("HIL_THREADS", 0)) or len(os.sched_getaffinity(0))
-if hasattr(ctypes.CDLL(None), "mallopt"):  # glibc: one heap for all threads, else each keeps memory the others freed
+_USABLE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+THREADS = int(os.environ.get("HIL_THREADS", 0)) or _USABLE
+# glibc: one heap for all threads, else each keeps memory the others freed
+if sys.platform == "linux" and hasattr(ctypes.CDLL(None), "mallopt"):
     ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
 POOL = ThreadPoolExecutor(THREADS)
 

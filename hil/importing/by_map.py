@@ -9,7 +9,8 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.channels import CHANNELS, AxisChannels
 from hil.errors import InputError
-from hil.files.input_file import bounded, is_file
+from hil.files.input_file import bounded
+from hil.files.shipped import given_or_shipped
 from hil.files.yaml_model import load_model
 from hil.importing.channel_clocks import merge, seconds
 from hil.importing.foreign_columns import FEW_MISSING, Foreign, read_foreign
@@ -24,7 +25,6 @@ from hil.recording.stamps import RegularRows, regular_rows
 EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
 STEP = "step"  # key of a channel's metadata: step of its values before they are interpolated
 ONE = "constant_of_one"  # key of a channel's metadata: constant of its effort that is 1 in the map, perhaps unknown
-MAPS = Path(__file__).parents[1] / "maps"
 
 
 @bounded
@@ -39,7 +39,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     Raises InputError with file, row and column: wrong format, a missing column, text, infinity, many missing values,
     columns of different length, time that runs back.
     """
-    source, map_path = Path(source), _find_map(map_path)
+    source, map_path = Path(source), given_or_shipped(map_path, "map")
     the_map = load_model(map_path, RecordingMap)
     wanted = [entry.column for entry in the_map.channels.values()]
     times = {entry.column: entry.time for entry in the_map.channels.values() if entry.time is not None}
@@ -113,11 +113,6 @@ def _in_units(source: Path, foreign: Foreign, asked: dict[str, str]) -> dict[str
             )
         columns[name] = columns[name] / factor
     return columns
-
-
-def _find_map(map_path: str | Path) -> Path:
-    shipped = MAPS / f"{map_path}.yaml"
-    return shipped if not is_file(Path(map_path)) and is_file(shipped) else Path(map_path)
 
 
 def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:

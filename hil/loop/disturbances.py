@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import resource
 from typing import NamedTuple
 
 
@@ -23,6 +22,8 @@ class Disturbances(NamedTuple):
     @classmethod
     def now(cls) -> Disturbances:
         """Count them."""
+        import resource  # POSIX only: of a run on wall-clock time
+
         usage = resource.getrusage(resource.RUSAGE_SELF)
         collections = sum(generation["collections"] for generation in gc.get_stats())
         return cls(usage.ru_minflt + usage.ru_majflt, usage.ru_nivcsw, collections, len(os.listdir("/proc/self/task")))

@@ -25,10 +25,11 @@ from drivers.sim.sensors import Sensors
 from drivers.sim.serial_line import SimulatedSerialEncoder
 from drivers.sim.servo import DriveServo, PositionFeedback, Servo, VelocityEstimate
 from hil.bench.axis_models import Axis, OneMass, Rigid, SerialChain, SevenDofAxis, TwoMass
-from hil.bench.bench_file import Bench, bench_path
+from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveSection, EncoderConnection, SimulationSection
 from hil.bench.turning_axes import DcMotor, Rotary, RotaryTwoMass
 from hil.errors import FieldError
+from hil.files.shipped import given_or_shipped
 from hil.files.yaml_model import load_model
 
 RATED_TORQUE_N_M = 4.0  # of the simulated drive if the bench gives none
@@ -47,7 +48,7 @@ class _Simulated(Bench):
 
 def load_simulated(source: str | Path) -> Bench:
     """Load a bench file and check its simulated axis. Raises InputError with file, line and field."""
-    path = bench_path(source)
+    path = given_or_shipped(source, "bench")
     bench = load_model(path, _Simulated)
     return bench if bench.name else bench.model_copy(update={"name": path.stem})
 

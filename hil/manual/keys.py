@@ -14,7 +14,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from hil.bench.bench_file import Bench, shipped_benches
+from hil.bench.bench_file import Bench
+from hil.files.shipped import shipped_files
 from hil.files.yaml_model import load_model
 from hil.importing.map_file import RecordingMap
 from hil.motion.profile import Profile
@@ -22,7 +23,6 @@ from hil.quantities import unit_of
 
 FORMATS: dict[str, type[BaseModel]] = {"bench": Bench, "profile": Profile, "map": RecordingMap}
 EXAMPLES = Path(__file__).parent / "examples"  # FORMAT-NAME.yaml
-_MAPS = Path(__file__).parents[1] / "maps"
 _UNBOUNDED = 1e15  # a bound that only keeps numbers finite
 BELOW = "see below"
 
@@ -164,8 +164,8 @@ def _examples() -> dict[tuple[str, str], str]:
 def example_files() -> list[tuple[str, Path]]:
     """Format and path of every complete file from which examples are taken."""
     own = [(path.name.split("-")[0], path) for path in sorted(EXAMPLES.glob("*.yaml"))]
-    benches = [("bench", path) for path in shipped_benches().values()]
-    return [*own, *benches, *(("map", path) for path in sorted(_MAPS.glob("*.yaml")))]
+    shipped = [(kind, path) for kind in ("bench", "map") for path in shipped_files(kind).values()]
+    return [*own, *shipped]
 
 
 def _text(value: Any) -> str:

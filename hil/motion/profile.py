@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from hil.errors import FieldError, FieldPath, HilError
 from hil.files.output import write_text
+from hil.files.shipped import given_or_shipped
 from hil.files.yaml_model import load_model
 from hil.motion.excitation import SAMPLES_PER_PERIOD
 from hil.motion.pieces import MAX_DURATION_S, MotionLimits, Move
@@ -154,6 +155,9 @@ def write_profile(path: Path, profile: Profile) -> None:
     write_text(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120))
 
 
-def load_profile(path: str | Path) -> Profile:
-    """Read a profile file; InputError with file, line and field for anything that cannot be run."""
-    return load_model(path, Profile)
+def load_profile(source: str | Path) -> Profile:
+    """Load a profile file, or a shipped profile by its name.
+
+    Raises InputError with file, line and field for anything that cannot be run.
+    """
+    return load_model(given_or_shipped(source, "profile"), Profile)

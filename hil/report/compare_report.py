@@ -5,7 +5,7 @@ from pathlib import Path
 
 from hil.bench.axis_models import OneMass
 from hil.bench.bench_file import Bench
-from hil.figures.drawing import save
+from hil.files.optional_library import missing_of
 from hil.files.output import write_json, write_text
 from hil.identification.compare import EXPLAINED, Comparison
 from hil.identification.figures import block_panels, motion_panels
@@ -14,14 +14,27 @@ from hil.identification.nominal_fit import FitResult
 from hil.identification.terms import ambiguous
 from hil.identification.twin_deviation import BlockDeviation, Deviation
 from hil.quantities import change, digits, percent, quantity, with_error
-from hil.report import plots
 from hil.report.page import Page
 
 PARAMETER_HEADERS = ("parameter", "bench file", "fitted", "standard error", "change")
 
 
 def write_comparison(result: Comparison, folder: Path) -> None:
-    """Write compare.html, overview.png, move.png, blocks.png, compare.json and, after a fit, bench.fitted.yaml."""
+    """Write compare.json and, after a fit, bench.fitted.yaml.
+
+    With the libraries of the extra `report` also compare.html, overview.png, move.png and blocks.png.
+    """
+    write_json(folder / "compare.json", result.as_json())
+    if result.fit is not None:
+        write_bench(result.bench, folder / "bench.fitted.yaml")
+    if not missing_of("report"):
+        _write_page(result, folder)
+
+
+def _write_page(result: Comparison, folder: Path) -> None:
+    from hil.figures.drawing import save
+    from hil.report import plots
+
     time_s = result.measured.time_s
     page = Page(f"{result.recording.name} against its twin", _lead(result), verdict(result), result.explained)
     if result.held:
@@ -55,9 +68,6 @@ def write_comparison(result: Comparison, folder: Path) -> None:
     page.items(
         [*result.notes, *(f"{block.deviation.name}: {block.remark}." for block in result.blocks if block.remark)]
     )
-    write_json(folder / "compare.json", result.as_json())
-    if result.fit is not None:
-        write_bench(result.bench, folder / "bench.fitted.yaml")
     page.write(folder / "compare.html")
 
 

@@ -4,13 +4,14 @@ from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.location import residual_panels
-from hil.diagnosis.result import FitFigures, Result, TorqueLeft
+from hil.diagnosis.result import FitFigures, Result
 from hil.diagnosis.wording import label, spoken, title
 from hil.figures.drawing import save
-from hil.quantities import digits, percent, quantity, reading_unit
+from hil.quantities import digits, quantity, reading_unit
 from hil.report import plots
 from hil.report.compare_report import fitted_cells
 from hil.report.page import Page
+from hil.report.summary import torque_line
 
 _FIT_HEADERS = (
     "channel",
@@ -62,18 +63,6 @@ def fit_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
         ],
         mark=3,
     )
-
-
-def torque_line(left: TorqueLeft) -> str:
-    """One line: the residual torque on held-out motion of each twin, and by the plain model."""
-    shares = {
-        "bench file": left.owner,
-        "refitted": left.refitted,
-        "after": left.final,
-        "plain least squares": left.plain,
-    }
-    given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
-    return f"Residual torque on held-out motion, of the torque's standard deviation: {given}."
 
 
 def _figures(found: FitFigures, unit: str) -> list[str]:

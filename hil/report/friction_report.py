@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.figures.drawing import save
+from hil.files.optional_library import missing_of
 from hil.files.output import write_json
 from hil.identification.friction import FrictionResult
 from hil.quantities import change, digits, quantity
@@ -16,7 +16,27 @@ SCHEMA_VERSION = 1
 
 
 def write_friction(result: FrictionResult, name: str, bench: Bench | None, folder: Path) -> None:
-    """Write friction.html, friction.png and friction.json; values of `bench` stand beside the identified ones."""
+    """Write friction.json, and with the libraries of the extra `report` also friction.html and friction.png.
+
+    Values of `bench` stand beside the identified ones.
+    """
+    units = result.units
+    write_json(
+        folder / "friction.json",
+        {
+            "schema_version": SCHEMA_VERSION,
+            "recording": name,
+            "units": {"coulomb": units.coulomb, "viscous": units.viscous, "speed": units.speed},
+            **asdict(result),
+        },
+    )
+    if not missing_of("report"):
+        _write_page(result, name, bench, folder)
+
+
+def _write_page(result: FrictionResult, name: str, bench: Bench | None, folder: Path) -> None:
+    from hil.figures.drawing import save
+
     units = result.units
     feeds = [abs(point.feed_m_s) * 60.0 for point in result.points]
     page = Page(
@@ -54,15 +74,6 @@ def write_friction(result: FrictionResult, name: str, bench: Bench | None, folde
             for point, torque in zip(result.points, line.tolist(), strict=True)
         ],
         left=(),
-    )
-    write_json(
-        folder / "friction.json",
-        {
-            "schema_version": SCHEMA_VERSION,
-            "recording": name,
-            "units": {"coulomb": units.coulomb, "viscous": units.viscous, "speed": units.speed},
-            **asdict(result),
-        },
     )
     page.write(folder / "friction.html")
 

@@ -1,16 +1,13 @@
 """Summary of a diagnosis on the terminal."""
 
-from pathlib import Path
-
-from hil.diagnosis.result import Result
+from hil.diagnosis.result import Result, TorqueLeft
 from hil.diagnosis.wording import spoken, title
 from hil.quantities import percent, quantity
 from hil.report.console import out, table
-from hil.report.fit_section import torque_line
 
 
-def print_diagnosis(result: Result, report: Path) -> None:
-    """Print residuals before and after, what was found, the statement, and where the page is."""
+def print_diagnosis(result: Result) -> None:
+    """Print residuals before and after, what was found, and the statement."""
     held_out = result.fit and next(iter(result.fit.values())).validate_
     rows = [
         (
@@ -38,4 +35,16 @@ def print_diagnosis(result: Result, report: Path) -> None:
         out.print(f"\n{torque_line(result.torque_left)}")
     if result.not_identifiable:
         out.print(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}; no correction is given.")
-    out.print(f"\n{result.statement}\n\nReport: {report}")
+    out.print(f"\n{result.statement}\n")
+
+
+def torque_line(left: TorqueLeft) -> str:
+    """One line: the residual torque on held-out motion of each twin, and by the plain model."""
+    shares = {
+        "bench file": left.owner,
+        "refitted": left.refitted,
+        "after": left.final,
+        "plain least squares": left.plain,
+    }
+    given = ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
+    return f"Residual torque on held-out motion, of the torque's standard deviation: {given}."

@@ -17,8 +17,8 @@ from mutations import damaged_bytes, damaged_text
 
 import hil
 from drivers.port import DriverError
-from hil.bench.bench_file import shipped_benches
 from hil.errors import HilError
+from hil.files.shipped import shipped_files
 from hil.loop.run import rehearse
 from hil.loop.simulated_bench import load_simulated
 from hil.recording.recording import Recording, write_parquet
@@ -74,13 +74,13 @@ def profile(rng: random.Random, folder: Path) -> None:
 
 @functools.cache
 def _benches() -> tuple[str, ...]:
-    return tuple(_COMMENT.sub("", path.read_text()) for path in shipped_benches().values())
+    return tuple(_COMMENT.sub("", path.read_text()) for path in shipped_files("bench").values())
 
 
 def rehearse_all() -> None:
     """Rehearse the shipped benches, which compiles all kernels."""
     jog = hil.load_profile(ROOT / "profiles" / "jog.yaml")
-    for name in shipped_benches():
+    for name in shipped_files("bench"):
         loaded = load_simulated(name)
         if loaded.law_known:
             with contextlib.suppress(HilError):

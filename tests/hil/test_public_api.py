@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from own_recordings import COGGING_LEARN, COGGING_PROVE
 from processes import DEADLINE_S
 from typer.testing import CliRunner
@@ -138,7 +137,9 @@ def test_no_module_hides_a_verb() -> None:
 
 def test_the_version_is_one_everywhere() -> None:
     assert hil.__version__ == version("hil-servo")
-    assert CliRunner().invoke(app, ["--version"]).output == f"hil-servo {hil.__version__}\n"
+    printed = CliRunner().invoke(app, ["--version"]).output
+    # after the release the state of the repository, as v0.4.0-12-g1234abc
+    assert re.fullmatch(rf"hil-servo {re.escape(hil.__version__)}( \(\S*[0-9a-f]{{7,}}(, changed)?\))?\n", printed)
 
 
 @pytest.fixture(scope="module")
@@ -240,9 +241,6 @@ def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monk
     lines = [line for line in block.splitlines() if line.strip()]
     assert len(lines) <= 12
     assert sum("diagnose" in line or "diagnosis" in line for line in lines) <= 3
-    shorter = yaml.safe_dump(MOVE.model_dump(mode="json", exclude_none=True))
-    (tmp_path / "profiles").mkdir()
-    (tmp_path / "profiles" / "reference.yaml").write_text(shorter)
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     exec("\n".join(line for line in lines if "diagnos" not in line and ".plot(" not in line), names)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from hil.bench.bench_file import load_bench, shipped_benches
+from hil.bench.bench_file import load_bench
 from hil.errors import InputError
+from hil.files.shipped import shipped_files
 
 CHAIN = """\
 lead_m: 0.01
@@ -28,7 +29,7 @@ control: {position_gain_1_s: 36.84, velocity_gain_n_m_s_rad: 0.27}
     ],
 )
 def test_a_value_in_the_wrong_unit_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
-    text = shipped_benches()["reference"].read_text()
+    text = shipped_files("bench")["reference"].read_text()
     assert old in text
     path = tmp_path / "bench.yaml"
     path.write_text(text.replace(old, new))
@@ -37,7 +38,7 @@ def test_a_value_in_the_wrong_unit_is_refused(tmp_path: Path, old: str, new: str
 
 
 def test_feedback_needs_its_encoder(tmp_path: Path) -> None:
-    text = shipped_benches()["reference"].read_text()
+    text = shipped_files("bench")["reference"].read_text()
     path = tmp_path / "bench.yaml"
     path.write_text(text.replace("encoders:", "  position_feedback: table\nencoders:"))
     assert load_bench(path).gains.position_from_table
@@ -57,7 +58,7 @@ def test_a_chain_has_one_spring_less_than_inertias(tmp_path: Path) -> None:
 
 def test_a_mechanism_acts_no_more_often_than_it_may(tmp_path: Path) -> None:
     entry = "\n  - {effect: cogging_torque, parameters: {amplitude_n_m: 0.1, cycles_per_rev: %d, phase_rad: 0.0}}"
-    text = shipped_benches()["reference"].read_text()
+    text = shipped_files("bench")["reference"].read_text()
     path = tmp_path / "bench.yaml"
     path.write_text(text + "\nmechanisms:" + "".join(entry % order for order in (6, 12, 24, 36)))
     assert len(load_bench(path).twin().active) == 4

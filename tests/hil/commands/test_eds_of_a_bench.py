@@ -8,7 +8,7 @@ import pytest
 from command_line import hil, refused
 
 from drivers.sdo_setup import EDS_FOLDER
-from hil.bench.bench_file import bench_path
+from hil.files.shipped import shipped_files
 
 PROFILE = Path(__file__).parents[3] / "profiles" / "jog.yaml"
 DRIVE = (EDS_FOLDER / "servo_drive.eds").read_text()
@@ -17,7 +17,7 @@ POSITION = "ParameterName=Position actual value\nObjectType=0x7\nDataType=0x0004
 
 def bench(folder: Path, eds: Path, encoder: Path | None = None) -> Path:
     path = folder / "mine.yaml"
-    text, lines = bench_path("reference").read_text(), [f"\ndrive:\n  eds: {eds}\n"]
+    text, lines = shipped_files("bench")["reference"].read_text(), [f"\ndrive:\n  eds: {eds}\n"]
     assert "\ndrive:" in text
     if encoder is not None:
         lines = [f"\ndrive:\n  eds: {eds}\n  encoder: {{eds: {encoder}}}\n"]

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hil
-from hil.bench.bench_file import bench_path
 from hil.files.output import new_folder
+from hil.files.shipped import shipped_files
 from hil.report.console import out, table
 
 BENCH = hil.load_bench("reference")
@@ -43,7 +43,7 @@ def test_square_brackets_in_a_name_are_printed_as_they_are(capsys: pytest.Captur
     ],
 )
 def test_numbers_that_no_axis_has_are_refused_at_their_line(tmp_path: Path, key: str, wrong: str) -> None:
-    text = bench_path("reference").read_text()
+    text = shipped_files("bench")["reference"].read_text()
     assert key in text
     path = tmp_path / "bench.yaml"
     path.write_text(text.replace(key, wrong))

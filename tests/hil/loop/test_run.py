@@ -13,8 +13,9 @@ import pytest
 from bench_runs import MOVE, bench_with
 from patient_bench import needs_every_tick, patient_bench
 
-from hil.bench.bench_file import Bench, shipped_benches
+from hil.bench.bench_file import Bench
 from hil.errors import FieldError, HilError, InputError
+from hil.files.shipped import shipped_files
 from hil.identification.friction import identify_friction
 from hil.loop.clock import WallClock
 from hil.loop.run import run_profile
@@ -107,7 +108,7 @@ def test_friction_found_on_the_bench_is_that_of_the_axis(tmp_path: Path, name: s
 
 
 @pytest.mark.parametrize(
-    "name", sorted(name for name, path in shipped_benches().items() if "simulation:" in path.read_text())
+    "name", sorted(name for name, path in shipped_files("bench").items() if "simulation:" in path.read_text())
 )
 def test_shipped_benches_run(tmp_path: Path, name: str) -> None:
     assert run_profile(load_simulated(name), MOVE, tmp_path, "run", virtual=True).complete
@@ -165,7 +166,7 @@ def test_a_drive_that_does_not_answer(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_bench_is_refused_with_file_and_line(tmp_path: Path, lines: str, field: str) -> None:
-    text = shipped_benches()["reference"].read_text().split("drive:")[0]
+    text = shipped_files("bench")["reference"].read_text().split("drive:")[0]
     path = tmp_path / "bench.yaml"
     path.write_text(text + lines + "\n")
     with pytest.raises(InputError, match=rf"bench\.yaml:\d+: {field}"):
@@ -183,7 +184,7 @@ def test_command_line(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert str(tmp_path / "out/reference_100mm_7.parquet") in done.stdout
     believed = tmp_path / "believed.yaml"
-    believed.write_text(shipped_benches()["reference"].read_text().split("drive:")[0])
+    believed.write_text(shipped_files("bench")["reference"].read_text().split("drive:")[0])
     stopped = subprocess.run(
         [*hil, "run", str(ROOT / "profiles/reference.yaml"), "--bench", str(believed), "--virtual"],
         capture_output=True,

@@ -194,3 +194,16 @@ def test_wrong_limits_are_refused(tmp_path: Path, old: str, new: str, expected: 
     with pytest.raises(InputError) as caught:
         load(tmp_path, "- {kind: dwell, duration_s: 1}\n", HEAD.replace(old, new))
     assert f"{tmp_path / 'profile.yaml'}{expected}" in str(caught.value)
+
+
+def test_a_shipped_profile_has_a_short_name_that_no_file_without_yaml_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert load_profile("jog") == load_profile(ROOT / "profiles" / "jog.yaml")
+    with pytest.raises(InputError, match=r"nowhere: no such profile; give a \.yaml file or one of chirp, creep, .*jog"):
+        load_profile("nowhere")
+    monkeypatch.chdir(tmp_path)
+    for name in ("jog", "mine", "jog.yaml"):
+        (tmp_path / name).write_text((ROOT / "profiles" / "creep.yaml").read_text())
+    assert load_profile("jog") == load_profile(ROOT / "profiles" / "jog.yaml")
+    assert load_profile("mine") == load_profile("jog.yaml") == load_profile("creep")

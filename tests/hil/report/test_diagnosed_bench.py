@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.bench.bench_file import Bench, bench_path, load_bench
+from hil.bench.bench_file import Bench, load_bench
 from hil.bench.hardware import SimulationSection
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.result import Finding
+from hil.files.shipped import shipped_files
 from hil.identification.compare import compare
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
@@ -22,7 +23,7 @@ from hil.loop.simulated_bench import load_simulated, true_axis
 from hil.report.diagnosed_bench import write_diagnosed_bench
 
 OWNER = load_bench("reference")
-SOURCE = bench_path("reference")
+SOURCE = shipped_files("bench")["reference"]
 COGGING = Term("cogging_torque", 0, (0.2, 6.0, 0.4))
 TRUTH = bench(table_mass_kg=410.0, coulomb_torque_n_m=1.0)
 TRAIN, HELD_OUT = (recorded(TRUTH, COGGING, times=2, seed=seed, name=f"run_{seed}") for seed in (1, 2))

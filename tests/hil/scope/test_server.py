@@ -198,7 +198,7 @@ def test_without_the_extra_the_message_says_what_to_install(folder: Path) -> Non
     code = "import sys; sys.modules['uvicorn'] = None; sys.argv = ['hil', 'scope']; from hil.cli import main; main()"
     ran = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
     assert ran.returncode == 2
-    assert ran.stderr.strip() == "hil scope needs uvicorn: pip install 'hil-servo[scope]'"
+    assert ran.stderr.strip() == "this command needs uvicorn, which is not installed: pip install 'hil-servo[scope]'"
 
 
 def test_a_page_that_sends_nonsense_is_told_so_and_stays(shown: str) -> None:

@@ -1,4 +1,4 @@
-"""What a notebook shows of a result: its title, what it says in words, a table and its picture, as one piece of HTML."""
+"""What a notebook shows of a result: title, what it says in words, a table and its picture, as one piece of HTML."""
 
 from __future__ import annotations
 

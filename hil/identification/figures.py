@@ -9,8 +9,7 @@ import numpy as np
 from hil.figures.panels import DEVIATION, MEASURED, SIMULATED, Line, Panel
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from hil.figures.drawing import Drawing
     from hil.identification.compare import Comparison
     from hil.identification.friction import FrictionResult
     from hil.identification.twin_deviation import Deviation
@@ -62,7 +61,7 @@ def _difference(label: str, channel: Deviation, noise: float) -> Panel:
     return Panel(label, channel.unit, (Line("measured - simulated", values, DEVIATION),), noise)
 
 
-def friction_figure(result: FrictionResult) -> Figure:
+def friction_figure(result: FrictionResult) -> Drawing:
     """Draw torque over speed with the regression line, and below it the residuals."""
 
     from hil.figures.drawing import Drawing, style_axis

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import label_of_channel, torque_of, unit_of_channel
@@ -25,7 +24,7 @@ CAPTION = (
 )
 
 
-def change_figure(diagnosis: Diagnosis) -> Figure:
+def change_figure(diagnosis: Diagnosis) -> Drawing:
     """Draw the residual of each recording over time. Raises InputError if the axis did not change."""
     change = diagnosis.reported.judged.change
     if change is None:

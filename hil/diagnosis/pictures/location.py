@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.location.locate import block_shares, mismatch_energies, phase_shares, shown_in
@@ -26,7 +25,7 @@ TIME_BIN_S = 0.05  # resolves single moves
 ENERGY = "residual² / noise²"
 
 
-def location_figure(diagnosis: Diagnosis) -> Figure:
+def location_figure(diagnosis: Diagnosis) -> Drawing:
     """Draw shares of the residual energy by block and phase, and its mean over position, speed and time."""
     before = shown_in(reference_fit(diagnosis), diagnosis.held_out)
     seen = mismatch_energies(before, diagnosis.final)

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.diagnosis.structure_left import OFFSET, TORQUE, Dependence
 from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
@@ -23,7 +22,7 @@ CAPTION = (
 )
 
 
-def structure_figure(diagnosis: Diagnosis) -> Figure | None:
+def structure_figure(diagnosis: Diagnosis) -> Drawing | None:
     """Draw the strongest dependences of the residuals, one panel each; None where only an offset is left."""
     judged = diagnosis.reported.judged
     shown = [one for one in judged.structure if one.question.name != OFFSET][:MOST]

@@ -49,7 +49,10 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
     if not rows:
         return ""
     cells = [
-        "".join(f'<{tag} style="text-align:{"right" if at else "left"}">{escape(cell)}</{tag}>' for at, cell in row)
+        "".join(
+            f'<{tag} style="padding:0.1em 0.8em 0.1em 0;text-align:{"right" if at else "left"}">{escape(cell)}</{tag}>'
+            for at, cell in row
+        )
         for tag, row in (("td" if number else "th", enumerate(row)) for number, row in enumerate(rows))
     ]
     return f'<table style="margin:0 0 0.6em">{"".join(f"<tr>{row}</tr>" for row in cells)}</table>'

@@ -81,9 +81,12 @@ def legend_above(axis: Axes, handles: Sequence[object] | None = None) -> None:
         handles=axis.get_legend_handles_labels()[0] if handles is None else handles,
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
-        ncols=3,
+        ncols=4,
         frameon=False,
         borderaxespad=0.2,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        handlelength=1.6,
     )
 
 

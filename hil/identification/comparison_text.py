@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from hil.identification.twin_deviation import Deviation
 
 EXPLAINED: float = FLOOR**0.5  # rms over noise up to which a channel is explained; the threshold of the diagnosis
+_PANELS = 3  # of a card: torque, and the deviations of position and torque
 
 
 def statement(result: Comparison) -> str:
@@ -57,14 +58,18 @@ def in_lines(result: Comparison) -> str:
 def as_html(result: Comparison) -> str:
     """A card: the verdict in words, the deviations, and their picture."""
     from hil.figures.card import card
+    from hil.figures.drawing import over_time
+    from hil.identification.figures import block_panels, motion_panels
 
+    panels = motion_panels(result)[-_PANELS:] if result.held else block_panels(result)[:_PANELS]
+    picture = over_time("", result.measured.time_s, panels)
     head = "measured less simulated", "rms", "largest", "relative"
     rows = [
         (one.label, quantity(one.rms, one.unit), quantity(one.peak, one.unit), percent(one.relative))
         for one in _shown(result)
     ]
     title = f"{result.recording.name} compared with the twin of {result.bench.name}"
-    return card(title, result.statement, result.plot(), [head, *rows], result.explained)
+    return card(title, result.statement, picture, [head, *rows], result.explained)
 
 
 def _shown(result: Comparison) -> tuple[Deviation, ...]:

@@ -36,9 +36,9 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
     path: any file that `hil import` reads. rate_hz: rows per second, of a file without time stamps. axis: number or
     letter of the axis in the names of columns, of a file with several.
 
-    Returns the draft: `asked` are keys that the file does not tell, `unsure` is what to check. Save it as YAML, complete
-    it there, and read the file with `import_recording`. Raises InputError: a damaged file, no clock, no column that
-    moves, contradicting columns.
+    Returns the draft: `asked` are keys that the file does not tell, `unsure` is what to check. `hil.save` it as YAML,
+    complete it there, and read the file with `import_recording`. Raises InputError: a damaged file, no clock, no column
+    that moves, contradicting columns.
     """
     path = Path(path)
     table = read_table(path)

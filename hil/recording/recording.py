@@ -134,7 +134,7 @@ class Recording:
         names = self.axis
         usual = (names.position_command, names.velocity_command, *names.predicted)
         panels = [
-            Panel(name.replace("_", " "), CHANNELS[name].unit, (Line("recorded", self[name], MEASURED),))
+            Panel(CHANNELS[name].quantity, CHANNELS[name].unit, (Line("recorded", self[name], MEASURED),))
             for name in channels or [name for name in usual if name in self.columns]
         ]
         return over_time(self.name, self["time_s"], panels)
@@ -143,7 +143,9 @@ class Recording:
         from hil.figures.card import card
 
         first, channels = repr(self).split("\n")
-        return card(first, f"Channels: {channels.strip()}", self.plot())
+        few = (self.axis.velocity_command, self.axis.table_position, self.axis.motor_position, self.axis.torque)
+        picture = self.plot(*[name for name in few if name in self.columns])
+        return card(first, f"Channels: {channels.strip()}", picture)
 
 
 @bounded

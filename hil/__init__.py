@@ -160,7 +160,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'hil' has no attribute {name!r}")
     _provide_kernel_cache()
     value = getattr(import_module(_MODULE_OF[name]), name)
-    globals()[name] = value
+    if name != "LIBRARY":  # `register` makes another one
+        globals()[name] = value
     return value
 
 

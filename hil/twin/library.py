@@ -95,10 +95,11 @@ SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in (*LIBRARY, *MAPS
 
 
 def register(mechanism: Mechanism) -> None:
-    """Add a mechanism from outside the package at the end of the library.
+    """Add a mechanism from outside the package at the end of the library, so that twins have it and a diagnosis names it.
 
-    Call it before any other module of hil is imported: kernels are composed and compiled from the library then. Raises
-    RuntimeError afterwards, ValueError if the id is taken.
+    mechanism: equation, stage, parameters and texts, in a file of its own. Call it before anything else of hil is used:
+    kernels are composed and compiled from the library then. Raises RuntimeError afterwards, ValueError if the id is
+    taken.
     """
     global LIBRARY, SLOTS
     if "hil.twin.stepping.stages" in sys.modules:

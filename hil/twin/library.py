@@ -96,7 +96,7 @@ SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in (*LIBRARY, *MAPS
 
 
 def register(mechanism: Mechanism) -> None:
-    """Add a mechanism from outside the package at the end of the library, so that twins have it and a diagnosis names it.
+    """Add a mechanism from outside the package at the end of the library, which a diagnosis searches then.
 
     mechanism: equation, stage, parameters and texts, in a file of its own. Call it before anything else of hil is used:
     kernels are composed and compiled from the library then. Raises HilError afterwards, InputError if the id is

@@ -43,7 +43,8 @@ def picture_of(html: str) -> bytes:
 
 def test_a_figure_shows_itself_without_pyplot(recording: hil.Recording) -> None:
     assert recording.plot("torque_n_m")._repr_png_().startswith(PNG)
-    code = "import hil, sys; hil.read_recording(sys.argv[1]).plot()._repr_png_(); print('matplotlib.pyplot' in sys.modules)"
+    code = "import hil, sys; hil.read_recording(sys.argv[1]).plot()._repr_png_(); "
+    code += "print('matplotlib.pyplot' in sys.modules)"
     ran = subprocess.run(
         [sys.executable, "-c", code, str(CLEAN)], capture_output=True, text=True, timeout=DEADLINE_S, check=True
     )

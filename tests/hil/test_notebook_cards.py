@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from base64 import b64decode
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -115,7 +116,8 @@ def test_what_is_saved_is_read_again(recording: hil.Recording, comparison: hil.C
     assert np.array_equal(again["torque_n_m"], recording["torque_n_m"])
     bench = hil.load_bench("reference")
     assert hil.load_bench(hil.save(bench, tmp_path / "bench.yaml")).axis == bench.axis
-    drafted = hil.identify(recording)
+    motor = {name: recording[name] for name in ("time_s", "motor_position_rad", "torque_n_m")}  # no law to replay
+    drafted = hil.identify(replace(recording, columns=motor))
     assert hil.load_bench(hil.save(drafted, tmp_path / "drafted.yaml")).axis == drafted.bench.axis
     assert "coulomb_torque_n_m = " in repr(drafted)
     assert "data:image/png" in hil.save(comparison, tmp_path / "compare.html").read_text(encoding="utf-8")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
     from hil.diagnosis.diagnosis import Diagnosis
     from hil.diagnosis.experiment import Experiment
+    from hil.drafting.drafted_bench import DraftedBench
     from hil.identification.nominal_fit import FitResult
     from hil.investigation import Investigation
     from hil.loop.run import RunResult
@@ -118,6 +119,19 @@ def run(
     return read_recording(result.recording)
 
 
+def identify(recordings: Recording | Sequence[Recording]) -> DraftedBench:
+    """Draft the bench of an axis from its recordings alone: masses, friction, lead, gains, encoders.
+
+    recordings: of one axis, with position and torque of the motor in both directions; several tell more than one.
+
+    Returns the draft: `bench` to go on with, `values` with standard errors, `unsure` is what to check, `text` the file
+    that `hil.save` writes. Raises InputError if masses and friction cannot be told, with what is missing.
+    """
+    from hil.drafting.drafted_bench import drafted
+
+    return drafted(_given(recordings, "identify"))
+
+
 def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> FitResult:
     """Fit the nominal parameters of a bench (masses, stiffness, friction) to recordings.
 
@@ -132,9 +146,7 @@ def fit_nominal(recordings: Recording | Sequence[Recording], bench: Bench) -> Fi
     from hil.identification.measured import take
     from hil.identification.nominal_fit import fit_nominal as fit
 
-    given = _sequence(recordings)
-    if not given:
-        raise InputError("recordings: given none, allowed one or more; give the recordings to fit to")
+    given = _given(recordings, "fit to")
     bench = reduced(bench, given)
     return fit(prepare_dataset([take(recording, bench) for recording in given], bench))
 
@@ -213,6 +225,13 @@ def investigate(
 
 def _silent(task: str, share: float | None = None) -> None:
     """Ignore progress."""
+
+
+def _given(recordings: Recording | Sequence[Recording], what_for: str) -> Sequence[Recording]:
+    given = _sequence(recordings)
+    if not given:
+        raise InputError(f"recordings: given none, allowed one or more; give the recordings to {what_for}")
+    return given
 
 
 def _sequence(recordings: Recording | Sequence[Recording]) -> Sequence[Recording]:

@@ -31,6 +31,12 @@ class Channel:
     meaning: str
     sign: str = ""
 
+    @property
+    def quantity(self) -> str:
+        """The name without its unit, as words."""
+        unit = self.unit.replace("^", "").replace("/", "_").replace(" ", "_").lower()
+        return self.name.removesuffix(f"_{unit}").replace("_", " ")
+
 
 SPEED_SET_POINT = "velocity_reference_m_s"
 

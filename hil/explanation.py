@@ -12,15 +12,14 @@ import shlex
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.time_left import BUDGET_S
-from hil.drafting.bench_text import bench_text
-from hil.drafting.draft_bench import BenchDraft, draft_bench
+from hil.drafting.drafted_bench import DraftedBench, drafted
 from hil.errors import InputError
 from hil.exchange.own_file import read_exported
 from hil.files.input_file import is_file
@@ -30,7 +29,6 @@ from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import take_own_units
-from hil.loop.simulated_bench import load_simulated
 from hil.recording.recording import Recording, read_recording
 from hil.report.diagnosis_report import write_diagnosis
 
@@ -43,22 +41,49 @@ class Basis:
 
     recordings: tuple[Recording, ...]
     bench: Bench
-    draft: BenchDraft | None
+    draft: DraftedBench | None
     assumed: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A diagnosis and what it rests on; `report` is its page."""
+    """A diagnosis and what it rests on; `folder` has the maps, the bench and the report, whose page is `report`."""
 
     basis: Basis
     diagnosis: Diagnosis
-    report: Path
+    folder: Path
+
+    @property
+    def bench(self) -> Bench:
+        """The bench that the recordings were compared with: that of the folder or of the recordings, or a draft."""
+        return self.basis.bench
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        """The recordings, read by their maps."""
+        return self.basis.recordings
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What was assumed of recordings and bench, with the file in which it can be corrected."""
+        return self.basis.assumed
+
+    @property
+    def report(self) -> Path:
+        """The page."""
+        return self.folder / REPORT / PAGE
+
+    def __repr__(self) -> str:
+        return "\n".join([repr(self.diagnosis), "Assumed:", *(f"  - {one}" for one in self.assumed), str(self.report)])
+
+    def _repr_html_(self) -> str:
+        told = "".join(f"<li>{escape(one)}</li>" for one in self.assumed)
+        return f"{self.diagnosis._repr_html_()}<p>Assumed:</p><ul>{told}</ul><p>Report: {escape(str(self.report))}</p>"
 
 
 def explain(
-    sources: Sequence[Path],
-    folder: Path,
+    sources: str | Path | Sequence[str | Path],
+    folder: str | Path | None = None,
     *,
     rate_hz: float | None = None,
     axis: str | None = None,
@@ -69,15 +94,21 @@ def explain(
 ) -> Explanation:
     """Read the recordings of one axis, draft what the folder lacks, diagnose, and write the page.
 
-    `rate_hz`: rows per second of files without time stamps, `axis`: that of files with several. `progress` gets each
-    step, `first` what is known before the search, `answer` the diagnosis before its page is drawn.
+    sources: a file or several, any that `hil import` reads. folder: None takes explained-NAME of the first file; maps
+    and bench that are there are used, so correct them and call again. rate_hz: rows per second of files without time
+    stamps. axis: that of files with several. progress: called with each step. first: called with what is known before
+    the search. answer: called with the diagnosis before its page is drawn. budget_s: processor time of the search [s].
 
-    Raises InputError for a file that cannot be read, with the lines of its map that the user must complete, and for
-    recordings that cannot be diagnosed.
+    Returns `diagnosis`, `bench`, `recordings`, `assumed`, `folder` and `report`. Raises InputError for a file that
+    cannot be read, with the lines of its map that the user must complete, and for recordings that cannot be diagnosed.
     """
+    paths = [Path(one) for one in ((sources,) if isinstance(sources, str | Path) else sources)]
+    if not paths:
+        raise InputError("sources: given none, allowed one or more; give the recordings to explain")
+    folder = Path(f"explained-{paths[0].stem}") if folder is None else Path(folder)
     read = list[Recording]()
     assumed = list[str]()
-    for source in sources:
+    for source in paths:
         progress(f"reading {source.name}")
         recording, notes = _recording(source, folder, rate_hz, axis)
         read.append(recording)
@@ -92,7 +123,7 @@ def explain(
         progress("writing the report")
         path = folder / BENCH
         write_diagnosis(diagnosis, part, basis.assumed, path if is_file(path) else None)
-    return Explanation(basis, diagnosis, folder / REPORT / PAGE)
+    return Explanation(basis, diagnosis, folder)
 
 
 def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | None) -> tuple[Recording, list[str]]:
@@ -119,29 +150,14 @@ def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | No
     return import_recording(source, path), notes
 
 
-def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, BenchDraft | None, list[str]]:
+def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedBench | None, list[str]]:
     """The bench file at `path`, else the bench of the first recording, else a draft; and what was assumed."""
     if is_file(path):
         return load_bench(path), None, [f"{path}: used as it is"]
     if "bench" in recordings[0].metadata:
         return bench_of(recordings[0]), None, [f"{recordings[0].name}: the bench with which it was recorded"]
-    draft = draft_bench(*recordings)
-    text = valid_bench_text(draft, path)
+    draft = drafted(recordings)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, text)
+    write_text(path, draft.text)
     notes = [f"{path}: masses, friction, lead, gains, encoders; drafted from the recordings alone"]
-    return load_bench(path), draft, [*notes, *(f"{path}: {note}" for note in draft.unsure)]
-
-
-def valid_bench_text(draft: BenchDraft, path: Path) -> str:
-    """The text of a drafted bench file, checked as `hil validate` does. Raises InputError where it is not valid."""
-    text = bench_text(draft)
-    with TemporaryDirectory() as folder:
-        written = Path(folder) / path.name
-        written.write_text(text, encoding="utf-8")
-        try:
-            load_simulated(written)
-        except InputError as error:
-            told = str(error).replace(f"{folder}/", "")
-            raise InputError(f"the draft is no valid bench, and is not written: {told}") from None
-    return text
+    return draft.bench, draft, [*notes, *(f"{path}: {note}" for note in draft.unsure)]

@@ -25,7 +25,7 @@ def compare(
     from hil.identification.compare import Comparison
     from hil.identification.compare import compare as compare_recording
     from hil.identification.measured import bench_of
-    from hil.report.compare_report import PARAMETER_HEADERS, parameter_rows, rows_of, verdict, write_comparison
+    from hil.report.compare_report import PARAMETER_HEADERS, parameter_rows, rows_of, write_comparison
 
     recording = read_run(run)
     believed = load_bench(bench) if bench else bench_of(recording)
@@ -56,4 +56,4 @@ def compare(
         if result.fit is not None:
             out.print()
             table(PARAMETER_HEADERS, parameter_rows(result.fit))
-        out.print(f"\n{verdict(result)}\n\n{page_line(page)}")
+        out.print(f"\n{result.statement}\n\n{page_line(page)}")

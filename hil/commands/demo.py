@@ -48,7 +48,7 @@ def demo(
     # imported late: these take seconds
     from hil.diagnosis.diagnose import diagnose
     from hil.identification.compare import compare
-    from hil.report.compare_report import rows_of, verdict, write_comparison
+    from hil.report.compare_report import rows_of, write_comparison
     from hil.report.diagnosis_report import write_diagnosis
 
     with new_folder(folder) as part:
@@ -56,7 +56,7 @@ def demo(
         with progress() as tell:
             comparison = compare(learn, believed, progress=tell)
         table(("measured - twin of the bench file", "rms", "largest", "relative"), rows_of(comparison))
-        out.print(f"\n{verdict(comparison)}\n")
+        out.print(f"\n{comparison.statement}\n")
         with progress() as tell:
             diagnosis = diagnose([learn], [prove], believed, lambda text: tell(text, None))
         out.print(f"Diagnosis: {diagnosis.result.statement}\n")

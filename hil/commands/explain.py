@@ -46,7 +46,6 @@ def explain(
     from hil.report.summary import print_diagnosis
 
     compile_kernels()
-    folder = folder or Path(f"explained-{data[0].stem}")
     with progress() as tell:
         found = explain_files(
             data,
@@ -70,10 +69,7 @@ def _first_answer(basis: "Basis") -> None:
     if basis.draft is not None:
         table(
             ("", "value", "unit, standard error"),
-            [
-                (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.error)
-                for one in (*basis.draft.axis, *basis.draft.control)
-            ],
+            [(one.key, one.shown, one.error) for one in basis.draft.values],
         )
         for note in basis.draft.notes:
             out.print(f"  {note}")

@@ -20,9 +20,8 @@ def identify(
 ) -> None:
     """Write a bench file of an axis from its recordings alone: masses, friction, lead, gains, encoders, with errors."""
     from hil.commands.warm_up import compile_kernels
-    from hil.drafting.draft_bench import draft_bench
+    from hil.drafting.drafted_bench import drafted
     from hil.errors import InputError
-    from hil.explanation import valid_bench_text
     from hil.files.input_file import is_file
     from hil.files.output import write_text
 
@@ -33,12 +32,10 @@ def identify(
         raise InputError(f"{target}: given the ending {target.suffix!r}, allowed .yaml; correct --out")
     recordings = [read_run(run) for run in runs]
     compile_kernels()
-    draft = draft_bench(*recordings)
-    write_text(target, valid_bench_text(draft, target))
-    values = [*draft.axis, *draft.control]
-    rows = [
-        (one.key, f"{one.value:.6g}" if isinstance(one.value, float) else str(one.value), one.error) for one in values
-    ]
+    found = drafted(recordings)
+    draft = found.draft
+    write_text(target, found.text)
+    rows = [(one.key, one.shown, one.error) for one in found.values]
     rows += [] if draft.control else [("control", "unknown", draft.control_why)]
     table(("", "value", "unit, standard error"), rows)
     for note in draft.notes:

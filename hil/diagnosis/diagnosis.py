@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.experiment import Experiment
-from hil.diagnosis.result import Mode, Result
+from hil.diagnosis.result import Finding, Mode, Result
 from hil.diagnosis.stages import Reported, Searched
 from hil.diagnosis.turning import labelled
 from hil.diagnosis.verdict.fit_table import channel_residuals
@@ -20,7 +20,7 @@ from hil.identification.measured import Measured
 from hil.quantities import digits
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from hil.figures.drawing import Drawing
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,11 @@ class Diagnosis:
     def experiment(self) -> Experiment | None:
         """Motion that separates what is open; None if nothing is."""
         return self.reported.experiment
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found, each with `parameters`: name -> value, standard_error and unit."""
+        return self.result.findings
 
     @property
     def searched(self) -> Searched:
@@ -78,7 +83,7 @@ class Diagnosis:
 
     def plot(
         self, what: Literal["residuals", "location", "finding", "change"] = "residuals", number: int = 1
-    ) -> Figure:
+    ) -> Drawing:
         """Draw the residuals before and after, the location of the mismatch, the evidence for finding `number`, or that
         for a change of the axis.
 
@@ -117,6 +122,11 @@ class Diagnosis:
             for name, entry in self.result.parameter_corrections.items()
         ]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from hil.diagnosis.diagnosis_card import diagnosis_card
+
+        return diagnosis_card(self)
 
     def residuals(self, fit: Fit, run: Measured, mode: Mode = Mode.BLOCKS) -> dict[str, FloatArray]:
         """Residuals (n,) of a fit on one of the recordings, by channel."""

@@ -8,12 +8,13 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
+
+from hil.diagnosis.value import Correction, NotNegative, ResultPart, Value
 
 SCHEMA_FILE = Path(__file__).with_name("diagnosis.schema.json")
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Verdict(StrEnum):
@@ -44,32 +45,14 @@ class Mode(StrEnum):
     BLOCKS = "blocks"
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Value(_Part):
-    """An estimated parameter."""
-
-    value: float
-    std: NotNegative = Field(description="standard error")
-    unit: str
-
-
-class Correction(Value):
-    """A nominal parameter of the bench, estimated from the recordings."""
-
-    nominal: float = Field(description="value in the bench file")
-
-
-class Rival(_Part):
+class Rival(ResultPart):
     """Another mechanism that was fitted, and the evidence against it."""
 
     effect: str
     evidence: str
 
 
-class EventWindow(_Part):
+class EventWindow(ResultPart):
     """Window of one recording in which an event acts, by the time since the first row of the whole recording."""
 
     recording: str
@@ -78,7 +61,7 @@ class EventWindow(_Part):
     strength: Value
 
 
-class PulseTrain(_Part):
+class PulseTrain(ResultPart):
     """Windows of equal width at equal intervals."""
 
     start_s: float
@@ -87,7 +70,7 @@ class PulseTrain(_Part):
     count: int
 
 
-class Finding(_Part):
+class Finding(ResultPart):
     """A mechanism that the twin lacks."""
 
     effect: str = Field(description="id in the library of mechanisms")
@@ -103,14 +86,14 @@ class Finding(_Part):
     needed: str = Field("", description="residual energy without it, on training and on held-out recordings")
 
 
-class Phase(_Part):
+class Phase(ResultPart):
     """Share of the mismatch's energy in a phase of motion."""
 
     kind: PhaseKind
     share: Share
 
 
-class Location(_Part):
+class Location(ResultPart):
     """Location of the mismatch. Ranges and periods are null if it is not limited to one."""
 
     block: Literal["controller", "drive", "motor_side", "transmission", "table", "sensor"]
@@ -125,7 +108,7 @@ class Location(_Part):
     order_per_rev: NotNegative | None = Field(None, description="angle-locked: periods per revolution of the screw")
 
 
-class FitFigures(_Part):
+class FitFigures(ResultPart):
     """Root mean square residuals in the channel's unit."""
 
     before_rms: NotNegative = Field(description="nominal parameters refitted, no new physics")
@@ -141,7 +124,7 @@ class FitFigures(_Part):
         return self.before_rms if self.owner_rms is None else min(self.owner_rms, self.before_rms)
 
 
-class ChannelFit(_Part):
+class ChannelFit(ResultPart):
     """Fit of one channel before and after, on training and on held-out recordings."""
 
     unit: str
@@ -158,14 +141,14 @@ AT_FLOOR = (
 )
 
 
-class Unexplained(_Part):
+class Unexplained(ResultPart):
     """Residuals above the noise floor."""
 
     share: Share = Field(description="of the energy above the floor with the refitted nominal twin")
     description: str
 
 
-class TorqueLeft(_Part):
+class TorqueLeft(ResultPart):
     """Torque left on held-out recordings, predicted from the measured motion, over its standard deviation.
 
     The deviation is that of all recordings, training and held-out together.
@@ -179,14 +162,14 @@ class TorqueLeft(_Part):
     )
 
 
-class ChangedParameter(_Part):
+class ChangedParameter(ResultPart):
     """A parameter of the axis that is another one in each part of the recordings."""
 
     name: str
     values: tuple[Value, ...] = Field(description="in the order of the parts")
 
 
-class AxisChange(_Part):
+class AxisChange(ResultPart):
     """Change of the axis between recordings, or at a moment of one."""
 
     recording: str | None = Field(description="in which it changed; null between recordings")
@@ -195,7 +178,7 @@ class AxisChange(_Part):
     parameters: tuple[ChangedParameter, ...]
 
 
-class RuleAnswer(_Part):
+class RuleAnswer(ResultPart):
     """Answer of one rule of `hil.diagnosis.acceptance` on a candidate."""
 
     rule: str
@@ -204,7 +187,7 @@ class RuleAnswer(_Part):
     figures: dict[str, float | str | None] = Field(description="measured quantities; null where not finite")
 
 
-class CandidateLedger(_Part):
+class CandidateLedger(ResultPart):
     """A mechanism that was fitted, and its ledger: the rules in the order in which they were asked."""
 
     effect: str
@@ -214,7 +197,7 @@ class CandidateLedger(_Part):
     rules: tuple[RuleAnswer, ...]
 
 
-class StructureLeft(_Part):
+class StructureLeft(ResultPart):
     """A dependence of what is left on a quantity, which noise does not have."""
 
     channel: str = Field(description="torque that the axis needs beyond the twin's, or difference of the encoders")
@@ -224,7 +207,7 @@ class StructureLeft(_Part):
     text: str
 
 
-class Unnamed(_Part):
+class Unnamed(ResultPart):
     """A map of what has no name, as bench.diagnosed.yaml has it; motor units."""
 
     effect: str = Field(description="id of the map")
@@ -234,14 +217,14 @@ class Unnamed(_Part):
     nearest: str = Field("", description="mechanism of the library that was refuted last, and by what")
 
 
-class NextExperiment(_Part):
+class NextExperiment(ResultPart):
     """Motion that separates mechanisms that the recorded motion cannot."""
 
     profile: str = Field(description="profile file")
     separates: tuple[str, ...]
 
 
-class TimeBudget(_Part):
+class TimeBudget(ResultPart):
     """A search that its time budget ended: the result is the best so far."""
 
     budget_s: NotNegative
@@ -249,7 +232,7 @@ class TimeBudget(_Part):
     not_tried: tuple[str, ...] = Field(description="mechanisms that were not fitted beside those found")
 
 
-class Result(_Part):
+class Result(ResultPart):
     """diagnosis.json."""
 
     schema_version: Literal[1] = 1

@@ -4,7 +4,8 @@ import math
 from collections.abc import Sequence
 
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import AT_FLOOR, AxisChange, Correction, Finding, FitFigures, Result, Verdict
+from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, FitFigures, Result, Verdict
+from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import spoken, title
 from hil.identification.least_squares import SIGMAS
 from hil.identification.noise_floor import FLOOR

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from hil.figures.drawing import Drawing
 
 _WORDS = {
     "ball screw, nut and linear encoder": "gear, coupling and load encoder",
@@ -40,7 +40,7 @@ def speed_unit(turns: bool) -> tuple[float, str]:
     return (1.0, "rad/s") if turns else (60.0, "m/min")
 
 
-def labelled(figure: Figure, turns: bool) -> Figure:
+def labelled(figure: Drawing, turns: bool) -> Drawing:
     """The figure with titles and labels in the words of a load that turns, if it does."""
     for axis in figure.axes if turns else ():
         axis.set_title(of_load(axis.get_title(loc="left"), turns), loc="left")

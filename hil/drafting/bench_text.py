@@ -35,8 +35,7 @@ def bench_text(draft: BenchDraft) -> str:
 
 
 def _line(value: BenchValue) -> str:
-    shown = f"{value.value:.6g}" if isinstance(value.value, float) else str(value.value)
-    return f"{value.key}: {shown}   # {'; '.join(filter(None, (value.error, value.how)))}"
+    return f"{value.key}: {value.shown}   # {'; '.join(filter(None, (value.error, value.how)))}"
 
 
 def _name(text: str) -> str:

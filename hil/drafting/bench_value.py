@@ -11,3 +11,8 @@ class BenchValue:
     value: float | int | str
     error: str
     how: str = ""
+
+    @property
+    def shown(self) -> str:
+        """The value as text, a number with six digits."""
+        return f"{self.value:.6g}" if isinstance(self.value, float) else str(self.value)

@@ -1,6 +1,7 @@
 """Matplotlib figures in the style of every report. Matplotlib is loaded when this module is."""
 
 from collections.abc import Iterable, Sequence
+from io import BytesIO
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -11,11 +12,28 @@ from hil.figures.panels import NOISE, Panel, thin
 
 WIDTH_IN = 7.4  # of a picture: its letters are as large as those of a page of 700 px
 DRAWN_ROWS = 6000  # of a line: several per column of pixels
+PAGE_DPI, NOTEBOOK_DPI = 140, 100
 
 
-def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: slice = slice(None)) -> Figure:
+class Drawing(Figure):
+    """A matplotlib figure that a notebook shows where it is the value of a cell, without pyplot and its state."""
+
+    def __init__(self, width_in: float, height_in: float) -> None:
+        super().__init__(figsize=(width_in, height_in), layout="constrained")
+
+    def _repr_png_(self) -> bytes:
+        return self.png(NOTEBOOK_DPI)
+
+    def png(self, dpi: float) -> bytes:
+        """The figure as a PNG file."""
+        file = BytesIO()
+        self.savefig(file, format="png", dpi=dpi)
+        return file.getvalue()
+
+
+def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: slice = slice(None)) -> Drawing:
     """Draw panels one above the other over a common time axis (n,) [s], restricted to `rows`."""
-    figure = Figure(figsize=(WIDTH_IN, 0.8 + 1.75 * len(panels)), layout="constrained")
+    figure = Drawing(WIDTH_IN, 0.8 + 1.75 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     time_s = time_s[rows]
     for axis, panel in zip(axes, panels, strict=True):
@@ -63,9 +81,12 @@ def legend_above(axis: Axes, handles: Sequence[object] | None = None) -> None:
         handles=axis.get_legend_handles_labels()[0] if handles is None else handles,
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
-        ncols=3,
+        ncols=4,
         frameon=False,
         borderaxespad=0.2,
+        columnspacing=1.2,
+        handletextpad=0.5,
+        handlelength=1.6,
     )
 
 
@@ -87,5 +108,5 @@ def legend_outside(figure: Figure, axes: Iterable[Axes], columns: int = 4) -> No
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG and return the path."""
-    figure.savefig(path, dpi=140)
+    figure.savefig(path, dpi=PAGE_DPI)
     return path

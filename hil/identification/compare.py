@@ -13,13 +13,15 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
 from hil.errors import InputError
+from hil.identification import comparison_text
+from hil.identification.comparison_text import EXPLAINED
 from hil.identification.dataset import Dataset, prepare_dataset
 from hil.identification.derived_channels import completed, reduced
 from hil.identification.honest_refit import rms_of_channels, stays, unstable
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inverse_dynamics import InverseDynamics, fit_inverse_dynamics
 from hil.identification.measured import SETTLE_S, Measured, take
-from hil.identification.noise_floor import FLOOR, rms
+from hil.identification.noise_floor import rms
 from hil.identification.nominal_fit import MOST_STEPS, FitResult, fit_nominal
 from hil.identification.residuals import datum_m, differences
 from hil.identification.twin_deviation import (
@@ -35,10 +37,9 @@ from hil.identification.twin_deviation import (
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from hil.figures.drawing import Drawing
 
 SCHEMA_VERSION = 1
-EXPLAINED: float = FLOOR**0.5  # rms over noise up to which a channel is explained; the threshold of the diagnosis
 # Least noise of table less motor position: error of the integration step and beat of the encoder counts in closed loop.
 TABLE_ACCURACY_M = 0.15e-6
 
@@ -68,19 +69,15 @@ class Comparison:
     notes: tuple[str, ...]
 
     def __repr__(self) -> str:
-        shown = self.channels or tuple(block.deviation for block in self.blocks)
-        width = max(len(channel.name) for channel in shown)
-        lines = [
-            f"Comparison of {self.recording.name} with the twin of {self.bench.name}: "
-            f"{'explained' if self.explained else 'not explained'} (allowed {EXPLAINED:g} x noise: torque "
-            f"{self.torque_over_noise:.2f}, table against motor {self.table_over_noise:.2f})",
-            f"  {'measured less simulated':{width}}  {'rms':>10}  {'largest':>10}  relative",
-        ]
-        lines += [
-            f"  {channel.name:{width}}  {channel.rms:10.3g}  {channel.peak:10.3g}  {100.0 * channel.relative:7.3f} %"
-            for channel in shown
-        ]
-        return "\n".join([*lines, *(() if self.held else (f"  {self.notes[0]}",))])
+        return comparison_text.in_lines(self)
+
+    def _repr_html_(self) -> str:
+        return comparison_text.as_html(self)
+
+    @property
+    def statement(self) -> str:
+        """Whether the twin explains the recording and, if not, which block deviates most, in words."""
+        return comparison_text.statement(self)
 
     def channel(self, name: str) -> Deviation:
         """The deviation of a channel by its name."""
@@ -121,7 +118,7 @@ class Comparison:
         """True if torque and table less motor position deviate by at most 1.25 x their noise (rms) in closed loop."""
         return self.held and bool(max(self.torque_over_noise, self.table_over_noise) <= EXPLAINED)
 
-    def plot(self, blocks: bool = False, fastest_move: bool = False) -> Figure:
+    def plot(self, blocks: bool = False, fastest_move: bool = False) -> Drawing:
         """Draw measured, simulated and their deviation over time: the whole axis in closed loop or block by block.
 
         With `fastest_move` only the move with the greatest speed is drawn.

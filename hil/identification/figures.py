@@ -9,8 +9,7 @@ import numpy as np
 from hil.figures.panels import DEVIATION, MEASURED, SIMULATED, Line, Panel
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from hil.figures.drawing import Drawing
     from hil.identification.compare import Comparison
     from hil.identification.friction import FrictionResult
     from hil.identification.twin_deviation import Deviation
@@ -62,16 +61,15 @@ def _difference(label: str, channel: Deviation, noise: float) -> Panel:
     return Panel(label, channel.unit, (Line("measured - simulated", values, DEVIATION),), noise)
 
 
-def friction_figure(result: FrictionResult) -> Figure:
+def friction_figure(result: FrictionResult) -> Drawing:
     """Draw torque over speed with the regression line, and below it the residuals."""
-    from matplotlib.figure import Figure
 
-    from hil.figures.drawing import style_axis
+    from hil.figures.drawing import Drawing, style_axis
 
     units = result.units
     speed = np.array([point.speed for point in result.points])
     torque = np.array([point.torque for point in result.points])
-    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    figure = Drawing(9.0, 7.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     top.plot(speed, torque, "o", color=MEASURED, label=f"measured: {speed.size} stretches of constant feed")
     edge = 1.05 * float(np.abs(speed).max())

@@ -22,7 +22,7 @@ from hil.identification.least_squares import least_squares
 from hil.recording.recording import Recording
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from hil.figures.drawing import Drawing
 
 FEED_TOLERANCE = 1e-3  # relative deviation from a constant feed: above the rounding of printed set-points
 FEED_RESOLUTION_M_S = 2e-6  # two of the last digits that recordings are usually printed with
@@ -79,7 +79,7 @@ class FrictionResult:
         """Units on this kind of axis."""
         return _UNITS[self.kind]
 
-    def plot(self) -> Figure:
+    def plot(self) -> Drawing:
         """Draw torque over speed with the regression line, and the residuals."""
         from hil.identification.figures import friction_figure
 

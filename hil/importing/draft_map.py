@@ -30,11 +30,17 @@ from hil.importing.wraps import unwrapped, wrap_range
 
 @bounded
 @np.errstate(invalid="ignore", over="ignore")  # an infinity is refused with its row, after sums and differences
-def draft_map(path: Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
-    """Draft the map of `path`; `rate_hz` and `axis` are what the user says beside the file.
+def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
+    """Draft the map of a foreign file: which column is which channel, in which unit, with which sign.
 
-    Raises InputError: a damaged file, no clock, no column that moves, contradicting columns.
+    path: any file that `hil import` reads. rate_hz: rows per second, of a file without time stamps. axis: number or
+    letter of the axis in the names of columns, of a file with several.
+
+    Returns the draft: `asked` are keys that the file does not tell, `unsure` is what to check. `hil.save` it as YAML,
+    complete it there, and read the file with `import_recording`. Raises InputError: a damaged file, no clock, no column
+    that moves, contradicting columns.
     """
+    path = Path(path)
     table = read_table(path)
     given, labels = table.columns, _labels(table)
     times = set(time_columns(table, labels))

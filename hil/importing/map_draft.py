@@ -46,6 +46,16 @@ class MapDraft:
     asked: list[Asked] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        lines = [f"Drafted map of {self.table.path.name}"]
+        for one in self.channels:
+            asked = {key for channel, key, _ in self.asked if channel == one.channel}
+            entry = ", ".join(f"{key}: {value}" for key, value in one.entry.items() if key not in asked)
+            lines.append(f"  {one.channel}: {entry}  ({one.how})")
+        lines += [f"  please write: {' '.join(filter(None, one))}" for one in self.asked]
+        lines += [f"  please check: {note}" for note in self.unsure]
+        return "\n".join([*lines, *(f"  not used: {name}, {why}" for name, why in self.left_out.items())])
+
 
 def ask_column(draft: MapDraft, channel: str, what: str, unit_question: str, columns: Sequence[str]) -> None:
     """Add a channel of which column and unit are asked; `columns` are those that may be it."""

@@ -21,6 +21,7 @@ from hil.motion.pieces import MAX_DURATION_S, Array, Cubic, Motion, MotionLimits
 from hil.motion.time_optimal import MotionState, point_to_point, stop
 
 if TYPE_CHECKING:
+    from hil.figures.drawing import Drawing
     from hil.motion.profile import Profile
 
 APPROACH = "approach to start"
@@ -86,7 +87,7 @@ class Trajectory:
         }
         return replace(self, **arrays)
 
-    def plot(self) -> Any:
+    def plot(self) -> Drawing:
         """Draw position, velocity, acceleration and jerk over time; returns a matplotlib Figure."""
         from hil.figures.drawing import over_time
 

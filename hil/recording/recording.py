@@ -38,7 +38,9 @@ from hil.recording.row_clock import CLOCK_TOLERANCE
 from hil.recording.stamps import RegularRows, check_finite, regular_rows
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+    from hil.figures.drawing import Drawing
 
 PARTS = "parts"  # key of the metadata: row and time_s of each part, if there are gaps between them
 CLOCK_NOTES = "clock_notes"  # key of the metadata: what was done to the stamps
@@ -112,7 +114,16 @@ class Recording:
             for number, (part, end) in enumerate(zip(starts, ends, strict=True), 1)
         )
 
-    def plot(self, *channels: str) -> Figure:
+    def to_pandas(self) -> DataFrame:
+        """Return a pandas DataFrame: the index is time_s, a column per channel, named by quantity and SI unit.
+
+        `attrs` has the name, the period [s] and the unit of each column. Raises InputError if pandas is not installed.
+        """
+        from hil.recording.data_frame import data_frame
+
+        return data_frame(self.name, self.columns, self.period_s)
+
+    def plot(self, *channels: str) -> Drawing:
         """Draw channels over time, a panel each; without names: set-points, positions, torque and its command.
 
         Raises InputError for a channel that is not recorded.
@@ -123,10 +134,18 @@ class Recording:
         names = self.axis
         usual = (names.position_command, names.velocity_command, *names.predicted)
         panels = [
-            Panel(name.replace("_", " "), CHANNELS[name].unit, (Line("recorded", self[name], MEASURED),))
+            Panel(CHANNELS[name].quantity, CHANNELS[name].unit, (Line("recorded", self[name], MEASURED),))
             for name in channels or [name for name in usual if name in self.columns]
         ]
         return over_time(self.name, self["time_s"], panels)
+
+    def _repr_html_(self) -> str:
+        from hil.figures.card import card
+
+        first, channels = repr(self).split("\n")
+        few = (self.axis.velocity_command, self.axis.table_position, self.axis.motor_position, self.axis.torque)
+        picture = self.plot(*[name for name in few if name in self.columns])
+        return card(first, f"Channels: {channels.strip()}", picture)
 
 
 @bounded

@@ -7,7 +7,7 @@ from hil.bench.axis_models import OneMass
 from hil.bench.bench_file import Bench
 from hil.files.optional_library import missing_of
 from hil.files.output import write_json, write_text
-from hil.identification.compare import EXPLAINED, Comparison
+from hil.identification.compare import Comparison
 from hil.identification.figures import block_panels, motion_panels
 from hil.identification.inverse_dynamics import InverseDynamics
 from hil.identification.nominal_fit import FitResult
@@ -36,7 +36,7 @@ def _write_page(result: Comparison, folder: Path) -> None:
     from hil.report import plots
 
     time_s = result.measured.time_s
-    page = Page(f"{result.recording.name} against its twin", _lead(result), verdict(result), result.explained)
+    page = Page(f"{result.recording.name} against its twin", _lead(result), result.statement, result.explained)
     if result.held:
         page.heading("Measured and simulated")
         page.text(
@@ -90,29 +90,6 @@ def fitted_cells(nominal: float, value: float, error: float) -> tuple[str, str, 
     """Cells of a fitted value: bench file, fitted, standard error (infinite: at its bound), change."""
     shown, of_error = (digits(value, 4), "at its bound") if math.isinf(error) else with_error(value, error)
     return digits(nominal, 4), shown, of_error, change(value, nominal)
-
-
-def verdict(result: Comparison) -> str:
-    """Say whether the twin explains the recording and, if not, which block deviates most."""
-    if not result.held:
-        return result.notes[0]
-    torque, position = result.torque, result.channels[0]
-    figures = (
-        f"{torque.label} deviates by {quantity(torque.rms, torque.unit)} rms, "
-        f"{digits(result.torque_over_noise)} × its noise; {position.label} by "
-        f"{quantity(position.rms, position.unit)} rms"
-    )
-    if result.explained:
-        return f"The twin explains this recording: {figures}."
-    worst = [(block.deviation.rms / block.noise, block.deviation.name) for block in result.blocks if block.noise > 0.0]
-    if worst and max(worst)[0] <= EXPLAINED:
-        return (
-            f"The control loop of the twin differs from the real one: {figures}. Drive and axis by themselves are "
-            f"within {EXPLAINED:g} × their noise: check gains, periods, and where the loops run (drive.mode)."
-        )
-    where = f" Furthest from its noise: {max(worst)[1]} ({digits(max(worst)[0])} ×)." if worst else ""
-    todo = "" if result.fit else " The parameters may be wrong: --fit corrects them."
-    return f"The twin leaves something out: {figures}.{where}{todo}"
 
 
 def write_bench(bench: Bench, path: Path) -> None:

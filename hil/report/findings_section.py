@@ -5,9 +5,10 @@ from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure, term_of
-from hil.diagnosis.result import Finding, Value
+from hil.diagnosis.result import Finding
 from hil.diagnosis.statement import MENTIONED
 from hil.diagnosis.turning import of_load
+from hil.diagnosis.value import Value
 from hil.diagnosis.wording import label, title, titles
 from hil.figures.drawing import save
 from hil.quantities import percent, reading_unit, with_error

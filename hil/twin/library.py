@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from hil.compiled.kernel_cache import provide_kernel_cache
+from hil.errors import HilError, InputError
 from hil.twin.maps import MAPS
 from hil.twin.mechanism import Mechanism
 from hil.twin.mechanisms import (
@@ -95,16 +96,17 @@ SLOTS: tuple[Mechanism, ...] = tuple(mechanism for mechanism in (*LIBRARY, *MAPS
 
 
 def register(mechanism: Mechanism) -> None:
-    """Add a mechanism from outside the package at the end of the library.
+    """Add a mechanism from outside the package at the end of the library, which a diagnosis searches then.
 
-    Call it before any other module of hil is imported: kernels are composed and compiled from the library then. Raises
-    RuntimeError afterwards, ValueError if the id is taken.
+    mechanism: equation, stage, parameters and texts, in a file of its own. Call it before anything else of hil is used:
+    kernels are composed and compiled from the library then. Raises HilError afterwards, InputError if the id is
+    taken.
     """
     global LIBRARY, SLOTS
     if "hil.twin.stepping.stages" in sys.modules:
-        raise RuntimeError(f"{mechanism.id} must be registered before the kernels are built, got it afterwards")
+        raise HilError(f"{mechanism.id} must be registered before the kernels are built, got it afterwards")
     if mechanism.id in BY_ID:
-        raise ValueError(f"id must be a new one, got {mechanism.id}")
+        raise InputError(f"id must be a new one, got {mechanism.id}")
     LIBRARY = (*LIBRARY, mechanism)
     SLOTS = (*SLOTS, *[mechanism] * mechanism.most)
     BY_ID[mechanism.id] = mechanism

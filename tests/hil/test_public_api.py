@@ -29,13 +29,18 @@ VERBS = [
     "simulate",
     "run",
     "read_recording",
+    "draft_map",
     "import_recording",
+    "identify",
     "compare",
     "fit_nominal",
     "identify_friction",
     "diagnose",
+    "explain",
     "design_experiment",
     "investigate",
+    "register",
+    "save",
 ]
 NOUNS = [
     "Bench",

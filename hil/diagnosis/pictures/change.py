@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import label_of_channel, torque_of, unit_of_channel
 from hil.errors import InputError
-from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_above, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, SIMULATED, thin
 from hil.identification.estimator import Fit
 from hil.quantities import reading_unit
@@ -25,12 +24,12 @@ CAPTION = (
 )
 
 
-def change_figure(diagnosis: Diagnosis) -> Figure:
+def change_figure(diagnosis: Diagnosis) -> Drawing:
     """Draw the residual of each recording over time. Raises InputError if the axis did not change."""
     change = diagnosis.reported.judged.change
     if change is None:
         raise InputError("change: the axis did not change between or during these recordings")
-    figure = Figure(figsize=(WIDTH_IN, 1.0 + 2.4 * len(change.runs)), layout="constrained")
+    figure = Drawing(WIDTH_IN, 1.0 + 2.4 * len(change.runs))
     axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
     nominal = diagnosis.nominal
     for axis, run in zip(axes, change.runs, strict=True):

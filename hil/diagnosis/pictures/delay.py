@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.view import Captioned, View, around, longest
-from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
 from hil.figures.panels import NOISE
 from hil.identification.derivatives import motion
 from hil.identification.terms import Term
@@ -55,7 +54,7 @@ def cross_correlation(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     view = longest(views)
     pair = _pair(diagnosis, view)
     found, fine = (correlation(pair, view, finer) for finer in (1, FINER))
-    figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
+    figure = Drawing(WIDTH_IN, 6.0)
     mosaic = figure.subplot_mosaic([["peak", "left"], ["change", "change"]])
     factor, unit = reading_unit("s", float(found.lag_s[-1]))
     looks.twin(mosaic["peak"], factor * fine.lag_s, fine.before, "before")

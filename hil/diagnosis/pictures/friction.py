@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, bin_edges, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View
 from hil.diagnosis.turning import speed_unit
-from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
 from hil.figures.panels import DEVIATION, MEASURED
 from hil.identification.estimator import Fit
 from hil.identification.terms import Term
@@ -35,7 +34,7 @@ def friction_over_speed(diagnosis: Diagnosis, views: Sequence[View]) -> Captione
     to_read, unit_of_speed = speed_unit(axis_of.turns)
     to_read *= axis_of.ratio_m_rad
     terms = [term for term in diagnosis.final.terms if BY_ID[term.effect].text.picture is Picture.FRICTION]
-    figure = Figure(figsize=(WIDTH_IN, 5.8), layout="constrained")
+    figure = Drawing(WIDTH_IN, 5.8)
     (linear, logarithmic), (left, left_log) = figure.subplots(2, 2, height_ratios=(3, 2), sharey="row", sharex="col")
     rows = {sign: [_rows(view, sign) for view in views] for sign, *_ in DIRECTIONS}
     moving = {sign: one for sign, one in rows.items() if any(each.used.any() for each in one)}

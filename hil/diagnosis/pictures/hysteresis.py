@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
@@ -15,7 +14,7 @@ from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, law_at, means
 from hil.diagnosis.pictures.view import Captioned, View, longest, noise, unit_of_channel
 from hil.diagnosis.search.disturbance import smooth
 from hil.diagnosis.turning import speed_unit
-from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
 from hil.figures.panels import DEVIATION
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
@@ -53,7 +52,7 @@ def lost_motion(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     stretch = stretch - zero
     width = float(np.ptp(np.percentile((stretch - after)[run.evaluated], (2.0, 98.0))))
     loop = LoopSignals(reversal(diagnosis, run, width), stretch, stretch - before, stretch - after, noise(run, "table"))
-    figure = Figure(figsize=(WIDTH_IN, 4.4), layout="constrained")
+    figure = Drawing(WIDTH_IN, 4.4)
     left, right = figure.subplots(1, 2)
     unit = unit_of_channel(diagnosis, "table")
     _loop(left, diagnosis, view, loop, "table - motor position", unit)
@@ -78,7 +77,7 @@ def friction_loop(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     way = bench.axis.physics().coulomb_n_m / max(view.term.values[0], 1e-300) * bench.axis.ratio_m_rad
     rows = reversal(diagnosis, run, way)
     loop = LoopSignals(rows, friction, friction + before, friction + after)
-    figure = Figure(figsize=(WIDTH_IN, 4.4), layout="constrained")
+    figure = Drawing(WIDTH_IN, 4.4)
     left, right = figure.subplots(1, 2)
     unit = bench.axis.drive_unit
     _loop(left, diagnosis, view, loop, "friction", unit)

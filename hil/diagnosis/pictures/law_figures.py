@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
@@ -15,7 +14,7 @@ from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, Means, bin_edges
 from hil.diagnosis.pictures.laws import DrawnLaw
 from hil.diagnosis.pictures.over_time import residual_over_time
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
-from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED
 from hil.quantities import digits, reading_unit
 
@@ -47,7 +46,7 @@ def _over_all(law: DrawnLaw, diagnosis: Diagnosis, views: Sequence[View], rows: 
     term, (label, unit) = views[0].term, law.labelled(diagnosis, views[0])
     edges = bin_edges(rows, BINS)
     found, fine = means(rows, edges), np.linspace(edges[0], edges[-1], FINE)
-    figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained")
+    figure = Drawing(WIDTH_IN, 5.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     along, x_unit = reading_unit(law.over.unit(diagnosis), float(np.abs(edges).max()))
     curve, at_points = law.value(term, diagnosis, fine), law.value(term, diagnosis, found.x)
@@ -75,7 +74,7 @@ def _folded(
     ]
     found = means(folded, np.linspace(0.0, period, BINS_OF_PERIOD + 1))
     fine = np.linspace(0.0, period, FINE)
-    figure = Figure(figsize=(WIDTH_IN, 6.2), layout="constrained")
+    figure = Drawing(WIDTH_IN, 6.2)
     mosaic = figure.subplot_mosaic([["law", "spectrum"], ["left", "spectrum"]], height_ratios=(3, 2))
     above, below, beside = mosaic["law"], mosaic["left"], mosaic["spectrum"]
     along, x_unit = reading_unit(law.over.unit(diagnosis), period)

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.diagnosis.location.locate import block_shares, mismatch_energies, phase_shares, shown_in
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.turning import speed_unit
 from hil.diagnosis.wording import channel_names, spoken, title
-from hil.figures.drawing import WIDTH_IN, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
@@ -26,11 +25,11 @@ TIME_BIN_S = 0.05  # resolves single moves
 ENERGY = "residual² / noise²"
 
 
-def location_figure(diagnosis: Diagnosis) -> Figure:
+def location_figure(diagnosis: Diagnosis) -> Drawing:
     """Draw shares of the residual energy by block and phase, and its mean over position, speed and time."""
     before = shown_in(reference_fit(diagnosis), diagnosis.held_out)
     seen = mismatch_energies(before, diagnosis.final)
-    figure = Figure(figsize=(WIDTH_IN, 8.2), layout="constrained")
+    figure = Drawing(WIDTH_IN, 8.2)
     axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
     names = channel_names(diagnosis.given_bench, diagnosis.train.runs[0])
     blocks = {spoken(names[name]): share for name, share in block_shares(before).items()}

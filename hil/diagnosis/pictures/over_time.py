@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hil.diagnosis.pictures.view import Captioned, View, around, label_of_channel, unit_of_channel
-from hil.figures.drawing import WIDTH_IN, legend_above, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_above, style_axis
 from hil.figures.panels import COMMAND, MEASURED, thin
 from hil.quantities import reading_unit
 
@@ -26,7 +25,7 @@ def residual_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned
     run, channel = view.run, view.strongest
     before, after = view.residuals(channel)
     factor, unit = reading_unit(unit_of_channel(diagnosis, channel), float(np.abs(before[run.evaluated]).max()))
-    figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained")
+    figure = Drawing(WIDTH_IN, 5.6)
     axes = figure.subplots(2, 1)
     middle = run.evaluated.start + int(np.argmax(np.abs((before - after)[run.evaluated])))
     for axis, rows in zip(axes, (slice(run.evaluated.start, None), around(middle, run, ENLARGED_S)), strict=True):

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.signal import csd, welch
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.view import Captioned, View
-from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
 from hil.figures.panels import DEVIATION, MEASURED
 from hil.identification.residual_scales import inertia
 from hil.quantities import digits
@@ -41,7 +40,7 @@ def frequency_response(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned
     term = views[0].term
     mode_hz = BY_ID[term.effect].named(Role.FREQUENCY, term.values) or 1.0 / (20.0 * views[0].run.period_s)
     found = {which: response(diagnosis, views, mode_hz, which) for which in ("measured", "before", "after")}
-    figure = Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")
+    figure = Drawing(WIDTH_IN, 5.4)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1.4))
     looks.twin(above, found["before"].frequency_hz, found["before"].gain, "before")
     looks.twin(above, found["after"].frequency_hz, found["after"].gain, "after")

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from hil.diagnosis.structure_left import OFFSET, TORQUE, Dependence
-from hil.figures.drawing import WIDTH_IN, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.quantities import reading_unit
 
@@ -23,13 +22,13 @@ CAPTION = (
 )
 
 
-def structure_figure(diagnosis: Diagnosis) -> Figure | None:
+def structure_figure(diagnosis: Diagnosis) -> Drawing | None:
     """Draw the strongest dependences of the residuals, one panel each; None where only an offset is left."""
     judged = diagnosis.reported.judged
     shown = [one for one in judged.structure if one.question.name != OFFSET][:MOST]
     if not shown:
         return None
-    figure = Figure(figsize=(WIDTH_IN, 0.6 + 2.6 * len(shown)), layout="constrained")
+    figure = Drawing(WIDTH_IN, 0.6 + 2.6 * len(shown))
     axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
     mapped = {id(one.dependence): one.term.values for one in judged.unnamed}
     for axis, one in zip(axes, shown, strict=True):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.location.residual_energy import without_terms
 from hil.diagnosis.search.disturbance import Disturbance, disturbance
+from hil.figures.drawing import Drawing
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
 
@@ -30,7 +30,7 @@ CHANNEL_LABELS = {
 class Captioned(NamedTuple):
     """A figure and its caption."""
 
-    figure: Figure
+    figure: Drawing
     caption: str
 
 

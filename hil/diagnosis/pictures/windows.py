@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from hil.diagnosis.pictures.view import Captioned, View, torque_of
-from hil.figures.drawing import WIDTH_IN, legend_outside, style_axis
+from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, thin
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     shown = sorted(views, key=lambda view: not view.term.windows_of(view.run.name))[:MOST_RUNS]
     shown.sort(key=lambda view: view.run.start.time_s)
     ratio = diagnosis.given_bench.axis.ratio_m_rad
-    figure = Figure(figsize=(WIDTH_IN, 1.8 + 2.0 * len(shown)), layout="constrained")
+    figure = Drawing(WIDTH_IN, 1.8 + 2.0 * len(shown))
     axes = np.atleast_1d(figure.subplots(len(shown), 1))
     for axis, view in zip(axes, shown, strict=True):
         run, observer_s = view.run, diagnosis.train.observer_s

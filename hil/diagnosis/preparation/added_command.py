@@ -15,9 +15,10 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import EventWindow, Value
+from hil.diagnosis.result import EventWindow
 from hil.diagnosis.search.change_points import Segment, joined, segments, standing_out
 from hil.diagnosis.search.event_detection import BLOCK_S, SHORTEST, Event
+from hil.diagnosis.value import Value
 from hil.diagnosis.verdict.event_windows import train_of
 from hil.identification.derivatives import MeasuredMotion, motion, smoothed
 from hil.identification.law.fit import command_left

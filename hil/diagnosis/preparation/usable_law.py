@@ -12,8 +12,9 @@ import numpy as np
 from hil.bench.bench_file import Bench
 from hil.bench.control_section import without_law
 from hil.diagnosis.preparation.added_command import added_in_words, added_windows, windows_told, without_added
-from hil.diagnosis.result import Correction, EventWindow, Verdict
+from hil.diagnosis.result import EventWindow, Verdict
 from hil.diagnosis.search.event_detection import Event
+from hil.diagnosis.value import Correction
 from hil.identification.law.replay import Settings
 from hil.identification.measured import Measured
 from hil.recording.recording import RESAMPLED, Recording

@@ -7,7 +7,8 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import AxisChange, ChangedParameter, Value
+from hil.diagnosis.result import AxisChange, ChangedParameter
+from hil.diagnosis.value import Value
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors

@@ -10,8 +10,9 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import EventWindow, PulseTrain, Value
+from hil.diagnosis.result import EventWindow, PulseTrain
 from hil.diagnosis.turning import of_load
+from hil.diagnosis.value import Value
 from hil.diagnosis.wording import unit_in, value_in_words
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit

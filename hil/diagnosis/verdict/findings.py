@@ -12,10 +12,11 @@ from dataclasses import replace
 from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import Correction, Finding, Rival, Value
+from hil.diagnosis.result import Finding, Rival
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.stages import Searched
+from hil.diagnosis.value import Correction, Value
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event

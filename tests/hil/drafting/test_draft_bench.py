@@ -293,7 +293,9 @@ def test_several_recordings_are_one_axis_and_short_ones_are_no_obstacle(tmp_path
 
 
 def test_a_draft_that_is_no_valid_bench_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hil.explanation.bench_text", lambda draft: "schema_version: 1\naxis:\n  model: rotary\n")
+    monkeypatch.setattr(
+        "hil.drafting.drafted_bench.bench_text", lambda draft: "schema_version: 1\naxis:\n  model: rotary\n"
+    )
     write_parquet(_recording(AXIS), tmp_path / "log.parquet")
     with pytest.raises(InputError, match="no valid bench"):
         identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")

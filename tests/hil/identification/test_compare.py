@@ -18,7 +18,7 @@ from hil.identification.compare import Comparison, compare
 from hil.identification.measured import bench_of, take
 from hil.identification.twin_deviation import low_pass
 from hil.recording.recording import Recording
-from hil.report.compare_report import parameter_rows, rows_of, verdict, write_comparison
+from hil.report.compare_report import parameter_rows, rows_of, write_comparison
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_an_unstable_twin_is_said_so_with_figures_of_its_blocks(
     result = compare(run, bench.model_copy(update={"axis": feather, "control": law}))
     assert not result.held
     assert not result.explained
-    assert "in closed loop the twin is unstable" in verdict(result)
+    assert "in closed loop the twin is unstable" in result.statement
     assert "in closed loop the twin is unstable" in repr(result)
     write_comparison(result, tmp_path)
     numbers = json.loads((tmp_path / "compare.json").read_text())  # refuses NaN and infinity
@@ -180,7 +180,7 @@ def test_without_a_control_law_the_blocks_are_compared(run: Recording, clean: Co
     plant = {name: values for name, values in run.columns.items() if "command" not in name}
     result = compare(replace(run, columns=plant), unknown, fit=fit)
     assert not result.channels
-    assert "control law is unknown" in verdict(result)
+    assert "control law is unknown" in result.statement
     assert set(block_rms(result)) == {"motor and load", "transmission and table"}
     assert block_rms(result)["motor and load"] == pytest.approx(block_rms(clean)["motor and load"], rel=0.1)
 
@@ -212,4 +212,4 @@ def test_a_loop_elsewhere_is_not_blamed_on_the_axis(run: Recording) -> None:
     gains = bench.control.model_copy(update={"position_gain_1_s": 1.5 * bench.control.position_gain_1_s})
     result = compare(run, bench.model_copy(update={"control": gains}))
     assert not result.explained
-    assert verdict(result).startswith("The control loop of the twin differs from the real one")
+    assert result.statement.startswith("The control loop of the twin differs from the real one")

@@ -25,7 +25,7 @@ from hil.identification.compare import compare
 from hil.identification.figures import fastest_move
 from hil.identification.measured import bench_of
 from hil.quantities import quantity
-from hil.report.compare_report import verdict, write_bench, write_comparison
+from hil.report.compare_report import write_bench, write_comparison
 from hil.report.page import Page
 from hil.report.plots import over_time
 
@@ -106,9 +106,9 @@ def test_the_verdict_names_the_block(tmp_path: Path) -> None:
     effect = {"effect": "periodic_lead_error", "parameters": {"amplitude_m": 8e-6, "phase_rad": 0.5}}
     recording = record(tmp_path, bench_with({"effects": [effect]}))
     result = compare(recording, bench_of(recording))
-    assert verdict(result).startswith("The twin leaves something out: motor torque deviates by ")
-    assert "Furthest from its noise: transmission and table" in verdict(result)
-    assert "--fit" in verdict(result)
+    assert result.statement.startswith("The twin leaves something out: motor torque deviates by ")
+    assert "Furthest from its noise: transmission and table" in result.statement
+    assert "--fit" in result.statement
 
 
 def test_the_fastest_move_is_cut_out(tmp_path: Path) -> None:

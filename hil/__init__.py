@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
     from hil.diagnosis.result import Verdict
     from hil.errors import FieldError, HilError, InputError
+    from hil.frequency.curves import FrequencyResponse
+    from hil.frequency.measure import frf
     from hil.identification.compare import Comparison, compare
     from hil.identification.friction import identify_friction
     from hil.importing.by_map import import_recording
@@ -61,6 +63,7 @@ _MODULE_OF = {
     "compare": "hil.identification.compare",
     "fit_nominal": "hil.api",
     "identify_friction": "hil.identification.friction",
+    "frf": "hil.frequency.measure",
     "diagnose": "hil.api",
     "design_experiment": "hil.api",
     "investigate": "hil.api",
@@ -73,6 +76,7 @@ _MODULE_OF = {
     "Mechanism": "hil.twin.mechanism",
     "LIBRARY": "hil.twin.library",
     "Comparison": "hil.identification.compare",
+    "FrequencyResponse": "hil.frequency.curves",
     "Diagnosis": "hil.diagnosis.diagnosis",
     "Verdict": "hil.diagnosis.result",
     # errors
@@ -92,6 +96,7 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "compare",
     "fit_nominal",
     "identify_friction",
+    "frf",
     "diagnose",
     "design_experiment",
     "investigate",
@@ -103,6 +108,7 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "Mechanism",
     "LIBRARY",
     "Comparison",
+    "FrequencyResponse",
     "Diagnosis",
     "Verdict",
     "HilError",

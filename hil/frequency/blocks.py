@@ -5,7 +5,7 @@ themselves, so that a recording needs no profile beside it.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ SHORTEST_SEGMENT_S, LEAST_SEGMENTS = 0.5, 8
 # Welch (IEEE Trans. Audio 15, 1967): Hann segments that overlap by a half have the correlation 1/6 of their spectra
 WELCH_OVERLAP = 1.0 + 2.0 / 36.0
 
+SLIDING = 0.998  # share of the rows of a block with the speed of its feed: single rows are the noise of an encoder
+
 RECORD = (
     "record a multisine or a chirp on a slow feed: hil run profiles/frequency_response.yaml --bench BENCH "
     "(hil guide frequency-response)"
@@ -37,6 +39,21 @@ class Blocks:
     rows: int
     periodic: bool
     overlap: float = 1.0
+
+    def sliding(self, motor: FloatArray) -> NDArray[np.bool_]:
+        """Blocks (b,) in which the motor, at positions (n,), neither rests nor turns back, so that friction is constant."""
+        speed = np.gradient(motor)[self.first[:, None] + np.arange(self.rows)]
+        forwards = np.sign(speed.mean(axis=1, keepdims=True)) * speed > 0.0
+        return np.asarray(forwards.mean(axis=1) >= SLIDING)
+
+    def only(self, chosen: NDArray[np.bool_]) -> "Blocks":
+        """Some of the blocks (b,)."""
+        return replace(self, first=self.first[chosen])
+
+    @property
+    def enough(self) -> bool:
+        """True if their noise can be told."""
+        return self.first.size >= (LEAST_LAPS if self.periodic else LEAST_SEGMENTS)
 
     def spectra(self, position: FloatArray, step: int = 1, difference: bool = True) -> NDArray[np.complex128]:
         """Spectra (b, k) of a channel (n,) at multiples of 1 / (rows T), of every `step`-th row.

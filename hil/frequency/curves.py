@@ -103,7 +103,8 @@ class FrequencyResponse:
     to motor position). `margins` and `twin_margins` have the open loops. `bandwidth_hz` and `twin_bandwidth_hz` are
     -3 dB of the closed loops. `method`: "periods" or "welch"; `averages` independent blocks, `resolution_hz` apart.
     `coherence` (k,) at `frequency_hz` (k,) is that of torque and motor with the set-points; `trusted_hz` the range in
-    which the plant is known to a tenth. Printing it gives the table of `rows`; `plot` draws it.
+    which the plant is known to a tenth. `distorted`: the axis stopped in the excitation, so that friction is in the
+    responses beyond their errors. Printing it gives the table of `rows`; `plot` draws it.
     """
 
     name: str
@@ -119,6 +120,7 @@ class FrequencyResponse:
     twin_bandwidth_hz: Mapping[str, float]
     resonances: Resonances
     twin_resonances: Resonances
+    distorted: bool = False
     notes: tuple[str, ...] = ()
 
     @property

@@ -67,9 +67,7 @@ def stability_margins(
     phases = [(_between(turned, p), float(np.exp(_between(log_f, p))), p) for p in at]
     wrapped = [((phase + pi) % (2.0 * pi) - pi, hz, p) for phase, hz, p in phases]
     phase, crossover_hz, place = min(wrapped, key=lambda one: abs(one[0]), default=(nan, nan, nan))
-    delay_s, delay_hz = min(
-        ((phase % (2.0 * pi) / (2.0 * pi * hz), hz) for phase, hz, _ in phases), default=(nan, nan)
-    )
+    delay_s, delay_hz = min(((phase % (2.0 * pi) / (2.0 * pi * hz), hz) for phase, hz, _ in phases), default=(nan, nan))
 
     nearest = int(np.argmin(np.abs(1.0 + loop)))
     return StabilityMargins(

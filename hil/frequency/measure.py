@@ -37,7 +37,9 @@ from hil.identification.measured import Measured, take
 from hil.recording.recording import Recording
 from hil.twin.structure.frequency import bandwidth_hz, laplace, velocity_law
 
-EXCITED = 1e-4  # of the strongest line of the set velocity: rounding is far below, every line of a multisine above
+# Of the strongest line of the set velocity: every line of a multisine over two decades is above. Segments of a sweep
+# leak, so that lines beside its band are not excited by it; below the third line its window sees the mean.
+EXCITED, SWEPT, FIRST_SWEPT = 2e-3, 0.03, 3
 _TORQUE, _COMMAND, _MOTOR, _TABLE = range(4)  # channels of the estimate at the rows
 
 
@@ -55,10 +57,10 @@ def frf(recording: Recording, bench: Bench) -> FrequencyResponse:
     twin = bench.twin()
     gains = twin.loop_gains
     ticks = gains.position_ticks if bench.law_known else 1
-    blocks = find_blocks(
-        recording.name, run.position_command_m, run.velocity_command_m_s, run.period_s, ticks
-    )
-    lines = _Lines(run, blocks, ticks)
+    blocks = find_blocks(recording.name, run.position_command_m, run.velocity_command_m_s, run.period_s, ticks)
+    slides = blocks.sliding(run.motor)
+    all_slide = blocks.only(slides).enough
+    lines = _Lines(run, blocks.only(slides) if all_slide else blocks, ticks)
     measured = _plant(lines, bench, run)
     low, high = measured["plant_motor"].trusted_hz
     known = measured["plant_motor"].trusted
@@ -86,7 +88,8 @@ def frf(recording: Recording, bench: Bench) -> FrequencyResponse:
         twin_bandwidth_hz={name: _bandwidth(curves[name]) for name in measured if name.endswith("_closed")},
         resonances=resonances(measured["plant_motor"].within(known)),
         twin_resonances=resonances(curves["plant_motor"]),
-        notes=tuple(_notes(run, bench, blocks, gains)),
+        distorted=not all_slide,
+        notes=tuple([*_sliding(slides, all_slide), *_notes(run, bench, blocks)]),
     )
 
 
@@ -117,7 +120,8 @@ class _Lines:
         self.reference = blocks.spectra(run.position_command_m)
         power = np.sqrt(np.mean(np.abs(self.reference) ** 2, axis=0))
         self.slow = blocks.rows // (2 * ticks)  # lines below half of the rate of the position loop
-        excited = power > EXCITED * power.max()
+        excited = power > (EXCITED if blocks.periodic else SWEPT) * power.max()
+        excited[: 0 if blocks.periodic else FIRST_SWEPT - 1] = False
         self.closed = np.flatnonzero(excited & (np.arange(1, power.size + 1) < self.slow))
         self.all = _with_images(excited, blocks.rows // ticks) if blocks.periodic and ticks > 1 else self.closed
         channels = [run.torque, run.torque_command, run.motor, *([run.table_m] if run.table_m.size else [])]
@@ -228,18 +232,32 @@ def _bandwidth(curve: ResponseCurve) -> float:
     return bandwidth_hz(curve.frequency_hz, curve.response) if curve.frequency_hz.size else nan
 
 
-def _notes(run: Measured, bench: Bench, blocks: Blocks, gains: Gains) -> list[str]:
-    """What limits the measurement, in words."""
+def _sliding(slides: NDArray[np.bool_], kept_apart: bool) -> list[str]:
+    """What the friction does to the measurement, in words."""
+    stopped, blocks = int(np.count_nonzero(~slides)), slides.size
+    if stopped == 0:
+        return []
+    advice = "ride on a faster feed (base_feed_m_s) or lower the amplitude"
+    if kept_apart:
+        return [
+            f"The axis stops or turns back in {stopped} of {blocks} laps or segments, which are left out; {advice}."
+        ]
+    return [
+        f"The axis stops or turns back in {stopped} of {blocks} laps or segments: friction distorts the responses, and "
+        f"their standard errors do not contain that; {advice}."
+    ]
+
+
+def _notes(run: Measured, bench: Bench, blocks: Blocks) -> list[str]:
+    """What limits the measurement beside friction, in words."""
     notes = []
     rows = (blocks.first[:, None] + np.arange(blocks.rows)).ravel()
-    speed = np.gradient(gains.ratio_m_rad * run.motor, run.period_s)[rows]
-    if speed.min() < 0.0 < speed.max() and any(one.min() < 0.0 < one.max() for one in np.split(speed, len(blocks.first))):
-        notes.append(
-            "The axis reverses in the excitation, so that friction distorts the responses at low frequencies; ride on a "
-            "feed that is faster than the excitation (base_feed_m_s)."
-        )
-    if np.abs(run.torque_command[rows]).max() >= gains.torque_limit_n_m:
+    if np.abs(run.torque_command[rows]).max() >= bench.gains.torque_limit_n_m:
         notes.append("The torque reaches its limit, so that the loop is not linear; lower the amplitude.")
+    if not blocks.periodic:
+        notes.append(
+            "Segments of a sweep leak into each other: expect errors of some standard errors more; a multisine has none."
+        )
     if effects := left_out(bench):
         notes.append(f"The twin's curves are those of its linear part, without {', '.join(effects)}.")
     if not bench.law_known:

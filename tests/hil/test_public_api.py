@@ -34,6 +34,7 @@ VERBS = [
     "compare",
     "fit_nominal",
     "identify_friction",
+    "frf",
     "diagnose",
     "design_experiment",
     "investigate",
@@ -47,6 +48,7 @@ NOUNS = [
     "Mechanism",
     "LIBRARY",
     "Comparison",
+    "FrequencyResponse",
     "Diagnosis",
     "Verdict",
 ]

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
     from hil.diagnosis.result import Verdict
     from hil.errors import FieldError, HilError, InputError
-    from hil.frequency.curves import FrequencyResponse
     from hil.frequency.measure import frf
+    from hil.frequency.result import FrequencyResponse
     from hil.identification.compare import Comparison, compare
     from hil.identification.friction import identify_friction
     from hil.importing.by_map import import_recording
@@ -76,7 +76,7 @@ _MODULE_OF = {
     "Mechanism": "hil.twin.mechanism",
     "LIBRARY": "hil.twin.library",
     "Comparison": "hil.identification.compare",
-    "FrequencyResponse": "hil.frequency.curves",
+    "FrequencyResponse": "hil.frequency.result",
     "Diagnosis": "hil.diagnosis.diagnosis",
     "Verdict": "hil.diagnosis.result",
     # errors

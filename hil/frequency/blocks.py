@@ -41,7 +41,7 @@ class Blocks:
     overlap: float = 1.0
 
     def sliding(self, motor: FloatArray) -> NDArray[np.bool_]:
-        """Blocks (b,) in which the motor, at positions (n,), neither rests nor turns back, so that friction is constant."""
+        """Blocks (b,) in which the motor, at positions (n,), neither rests nor turns back: constant friction."""
         speed = np.gradient(motor)[self.first[:, None] + np.arange(self.rows)]
         forwards = np.sign(speed.mean(axis=1, keepdims=True)) * speed > 0.0
         return np.asarray(forwards.mean(axis=1) >= SLIDING)

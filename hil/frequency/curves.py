@@ -1,19 +1,14 @@
-"""Frequency responses of an axis as data: curves, their trustworthy range, resonances, bandwidth."""
+"""A frequency response as data: its lines, their trustworthy range, its resonances."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from hil.arrays import FloatArray
-from hil.frequency.margins import StabilityMargins
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 TRUSTED = 0.1  # relative standard error of a line that is trusted: 0.9 dB, 6 deg
 WIDEST_GAP = 1.25  # of frequency between trusted lines: an antiresonance is a few lines wide
@@ -62,8 +57,13 @@ class ResponseCurve:
 
     def within(self, chosen: NDArray[np.bool_]) -> "ResponseCurve":
         """The curve at some of its frequencies (k,)."""
-        arrays = (self.frequency_hz, self.response, self.std_error, self.coherence)
-        return ResponseCurve(self.title, self.unit, *(one[chosen] for one in arrays), self.radius)
+        return replace(
+            self,
+            frequency_hz=self.frequency_hz[chosen],
+            response=self.response[chosen],
+            std_error=self.std_error[chosen],
+            coherence=self.coherence[chosen],
+        )
 
 
 class Resonances(NamedTuple):
@@ -91,62 +91,3 @@ def resonances(curve: ResponseCurve) -> Resonances:
         return float(np.clip(x[1] - slope / (2.0 * bend), x[0], x[2]))
 
     return Resonances(first(-level_db), first(level_db))
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencyResponse:
-    """Measured frequency responses of an axis beside those of its twin.
-
-    `measured` and `twin` map the same names to a `ResponseCurve`: "plant_motor" (torque to motor position),
-    "plant_table" (torque to table position, with a linear encoder), and with a known control law "velocity_open",
-    "velocity_closed", "position_open", "position_closed" (position command to table position, without a linear encoder
-    to motor position). `margins` and `twin_margins` have the open loops. `bandwidth_hz` and `twin_bandwidth_hz` are
-    -3 dB of the closed loops. `method`: "periods" or "welch"; `averages` independent blocks, `resolution_hz` apart.
-    `coherence` (k,) at `frequency_hz` (k,) is that of torque and motor with the set-points; `trusted_hz` the range in
-    which the plant is known to a tenth. `distorted`: the axis stopped in the excitation, so that friction is in the
-    responses beyond their errors. Printing it gives the table of `rows`; `plot` draws it.
-    """
-
-    name: str
-    bench: str
-    method: str
-    averages: float
-    resolution_hz: float
-    measured: Mapping[str, ResponseCurve]
-    twin: Mapping[str, ResponseCurve]
-    margins: Mapping[str, StabilityMargins]
-    twin_margins: Mapping[str, StabilityMargins]
-    bandwidth_hz: Mapping[str, float]
-    twin_bandwidth_hz: Mapping[str, float]
-    resonances: Resonances
-    twin_resonances: Resonances
-    distorted: bool = False
-    notes: tuple[str, ...] = ()
-
-    @property
-    def frequency_hz(self) -> FloatArray:
-        """Frequencies (k,) of the plant [Hz]."""
-        return self.measured["plant_motor"].frequency_hz
-
-    @property
-    def coherence(self) -> FloatArray:
-        """Coherence (k,) of torque and motor with the set-points, the smaller one."""
-        return self.measured["plant_motor"].coherence
-
-    @property
-    def trusted_hz(self) -> tuple[float, float]:
-        """Range [Hz] in which the response of the plant is known to a tenth."""
-        return self.measured["plant_motor"].trusted_hz
-
-    def __str__(self) -> str:
-        from hil.frequency.table import as_text
-
-        return as_text(self)
-
-    __repr__ = __str__
-
-    def plot(self) -> "Figure":
-        """Draw magnitude and phase of plant and loops, measured with 95 % bounds over the twin, and the coherence."""
-        from hil.frequency.picture import overview
-
-        return overview(self)

@@ -25,12 +25,12 @@ from hil.frequency.blocks import RECORD, Blocks, find_blocks
 from hil.frequency.curves import (
     LEAST_LINES,
     LEAST_SPAN,
-    FrequencyResponse,
     ResponseCurve,
     resonances,
 )
 from hil.frequency.joint import JointEstimate, joint_estimate
 from hil.frequency.margins import StabilityMargins, stability_margins
+from hil.frequency.result import FrequencyResponse
 from hil.frequency.twin_curves import axis_units, left_out, titles, twin_curves
 from hil.identification.derived_channels import DERIVED
 from hil.identification.measured import Measured, take
@@ -49,8 +49,8 @@ def frf(recording: Recording, bench: Bench) -> FrequencyResponse:
     H1 estimate, joint for torque and position, so that the closed loop does not bias it (see `hil.frequency.joint`);
     by laps where the set-points repeat, else by Welch's segments. bench: gives the law, the units and the twin.
 
-    Returns the responses with standard errors, coherence and margins; arrays in Hz and SI units. Raises InputError, with
-    what to record, for a recording without torque, set-points or excitation, or too short; and as `compare`.
+    Returns the responses with standard errors, coherence and margins; arrays in Hz and SI units. Raises
+    InputError, with what to record, for a recording without torque, set-points or excitation, or too short.
     """
     run = _taken(recording, bench)
     bench = bench.sampled(run.period_s)
@@ -159,7 +159,8 @@ def _with_images(excited: NDArray[np.bool_], rate: int) -> NDArray[np.intp]:
     lines = np.flatnonzero(excited) + 1
     about = np.arange(0, excited.size + 1, rate)[:, None]
     images = np.unique(np.abs(np.concatenate([about + lines, about - lines])))
-    return images[(images >= 1) & (images < excited.size) & (images % rate != 0)] - 1
+    inside = (images >= 1) & (images < excited.size) & (images % rate != 0)
+    return np.asarray(images[inside] - 1, dtype=np.intp)
 
 
 def _plant(lines: _Lines, bench: Bench, run: Measured) -> dict[str, ResponseCurve]:
@@ -256,7 +257,7 @@ def _notes(run: Measured, bench: Bench, blocks: Blocks) -> list[str]:
         notes.append("The torque reaches its limit, so that the loop is not linear; lower the amplitude.")
     if not blocks.periodic:
         notes.append(
-            "Segments of a sweep leak into each other: expect errors of some standard errors more; a multisine has none."
+            "Segments of a sweep leak into each other: expect some standard errors more; a multisine has none."
         )
     if effects := left_out(bench):
         notes.append(f"The twin's curves are those of its linear part, without {', '.join(effects)}.")

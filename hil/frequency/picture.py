@@ -1,19 +1,23 @@
 """Bode diagrams of a frequency response: measured lines with their 95 % bounds over the twin, and the coherence."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MultipleLocator
 
 from hil.arrays import FloatArray
-from hil.figures.drawing import WIDTH_IN, legend_outside
 from hil.figures.panels import COMMAND, MEASURED, NOISE, SIMULATED
-from hil.frequency.curves import FrequencyResponse, ResponseCurve
+from hil.frequency.curves import ResponseCurve
 from hil.frequency.margins import ComplexArray, StabilityMargins
-from hil.frequency.table import digits
+from hil.quantities import digits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from hil.frequency.result import FrequencyResponse
 
 PAIRS = (("plant_motor", "plant_table"), ("velocity_open", "position_open"), ("velocity_closed", "position_closed"))
 BELOW_BAND, ABOVE_BAND = 0.7, 1.15  # drawn beyond the measured frequencies
@@ -22,21 +26,33 @@ _LEAST_DB = -400.0  # of a bound that reaches 0
 
 def overview(result: FrequencyResponse) -> Figure:
     """Draw plant, open and closed loops in one figure."""
+    from matplotlib.figure import Figure
+
+    from hil.figures.drawing import WIDTH_IN
+
     pairs = [pair for pair in PAIRS if any(name in result.measured for name in pair)]
     figure = Figure(figsize=(WIDTH_IN, 5.2 * len(pairs)), layout="constrained")
-    for part, pair in zip(np.atleast_1d(figure.subfigures(len(pairs), 1)), pairs, strict=True):
+    for part, pair in zip(figure.subfigures(len(pairs), 1, squeeze=False)[:, 0], pairs, strict=True):
         _draw(part, result, pair)
     return figure
 
 
 def bode(result: FrequencyResponse, names: Sequence[str]) -> Figure:
     """Draw some responses side by side: magnitude, phase, coherence."""
+    from matplotlib.figure import Figure
+
+    from hil.figures.drawing import WIDTH_IN
+
     figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained")
     _draw(figure, result, names)
     return figure
 
 
 def _draw(figure: Any, result: FrequencyResponse, names: Sequence[str]) -> None:
+    from matplotlib.ticker import FuncFormatter
+
+    from hil.figures.drawing import legend_outside
+
     names = [name for name in names if name in result.measured]
     grid = figure.subplots(3, len(names), sharex="col", squeeze=False, height_ratios=(3, 2, 1))
     for column, name in zip(grid.T, names, strict=True):
@@ -89,6 +105,8 @@ def _magnitude(axis: Axes, one: ResponseCurve, twin: ResponseCurve) -> None:
 
 
 def _phase(axis: Axes, one: ResponseCurve, twin: ResponseCurve) -> None:
+    from matplotlib.ticker import MultipleLocator
+
     degrees = np.degrees(np.unwrap(np.angle(twin.response)))
     degrees -= 360.0 * np.ceil(np.round(degrees[0]) / 360.0)  # unwrapping leaves whole turns free: start in (-360, 0]
     good = one.trusted

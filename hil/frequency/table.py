@@ -1,10 +1,15 @@
 """Results of a frequency response as rows of a table: measured, standard error, twin."""
 
-from math import isfinite, nan
+from __future__ import annotations
 
-from hil.frequency.curves import FrequencyResponse
+from math import isfinite, nan
+from typing import TYPE_CHECKING
+
 from hil.frequency.margins import StabilityMargins
 from hil.quantities import digits, with_error
+
+if TYPE_CHECKING:
+    from hil.frequency.result import FrequencyResponse
 
 HEADERS = ("", "measured", "standard error", "twin")
 _LOOPS = {"position": "position loop", "velocity": "velocity loop"}
@@ -56,9 +61,7 @@ def range_text(low_hz: float, high_hz: float) -> str:
 def verdict(result: FrequencyResponse) -> str:
     """Where the measurement can be trusted, and how stable the loops are, in some sentences."""
     how = "laps" if result.method == "periods" else "segments"
-    parts = [
-        f"The plant is known to a tenth from {range_text(*result.trusted_hz)} ({result.averages:.3g} independent {how})."
-    ]
+    parts = [f"The plant is known to a tenth from {range_text(*result.trusted_hz)} ({result.averages:.3g} {how})."]
     if result.distorted:
         parts.append("Friction distorts it: the axis stops in the excitation.")
     for loop, title in _LOOPS.items():

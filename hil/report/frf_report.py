@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 from hil.figures.drawing import save
 from hil.files.output import write_json
-from hil.frequency.curves import FrequencyResponse, ResponseCurve
+from hil.frequency.curves import ResponseCurve
 from hil.frequency.picture import PAIRS, bode
+from hil.frequency.result import FrequencyResponse
 from hil.frequency.table import HEADERS, range_text, rows_of, verdict
 from hil.report.page import Page
 
@@ -19,8 +20,8 @@ _CAPTIONS = (
     (
         "open_loops",
         "Open loops and their margins",
-        "The velocity loop with the position loop open, and the position loop around it, cut at its input. Dotted: 0 dB, "
-        "-180°, crossover with the phase margin, and the frequency of the gain margin, of the measured loop.",
+        "The velocity loop with the position loop open, and the position loop around it, cut at its input. Dotted: "
+        "0 dB, -180°, crossover with the phase margin, and the frequency of the gain margin, of the measured loop.",
     ),
     ("closed_loops", "Closed loops", "Velocity set-point to motor velocity; position set-point to position."),
 )
@@ -57,8 +58,8 @@ def write_frf(
             page.picture(path, text)
     page.heading("How it was measured")
     page.text(
-        "Torque and positions answer to the set-points, which no noise of a sensor reaches; the plant is the quotient of "
-        "two answers, so that the closed loop does not bias it (joint input-output estimate, H1). "
+        "Torque and positions answer to the set-points, which no noise of a sensor reaches; the plant is the quotient "
+        "of two answers, so that the closed loop does not bias it (joint input-output estimate, H1). "
         + (
             "Mean and covariance of the answers are those from lap to lap."
             if result.method == "periods"
@@ -74,8 +75,8 @@ def write_frf(
         left=(0, 1),
     )
     page.text(
-        "Trustworthy: standard error below a tenth (0.9 dB, 6°). Bars: 95 % bounds of magnitude and phase. Coherence: of "
-        "torque and position with the set-points, the smaller one."
+        "Trustworthy: standard error below a tenth (0.9 dB, 6°). Bars: 95 % bounds of magnitude and phase. Coherence: "
+        "of torque and position with the set-points, the smaller one."
     )
     write_json(folder / "frf.json", as_json(result))
     page.write(folder / "frf.html")

@@ -1,15 +1,18 @@
 """Measured frequency responses over the figures 9 a to c of the source, for a bench with its axis."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.frequency.curves import FrequencyResponse, ResponseCurve
+from hil.frequency.curves import ResponseCurve
 from hil.frequency.picture import beside, decibels
+from hil.frequency.result import FrequencyResponse
 from hil.twin.structure.frequency import ComplexArray, laplace
 from hil.validation.paper import PaperPicture, figures, source
 
@@ -53,10 +56,10 @@ def _is_the_source_axis(bench: Bench) -> bool:
     )
 
 
-def _over(figure: Figure, curve: ResponseCurve, response: ComplexArray, good: FloatArray) -> None:
+def _over(figure: Figure, curve: ResponseCurve, response: ComplexArray, good: NDArray[np.bool_]) -> None:
     magnitude, phase = figure.axes
     hz = curve.frequency_hz[good]
-    look = {"color": MEASURED_COLOUR, "markersize": 3, "linestyle": "none", "marker": ".", "zorder": 5}
+    look: dict[str, Any] = {"color": MEASURED_COLOUR, "markersize": 3, "linestyle": "none", "marker": ".", "zorder": 5}
     magnitude.plot(hz, decibels(response[good]), label="measured", **look)
     line_hz, line_deg = _longest_line(phase)
     phase.plot(hz, beside(hz, response[good], line_hz, line_deg), **look)

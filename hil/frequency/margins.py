@@ -41,6 +41,7 @@ class StabilityMargins:
     modulus_hz: float
     gain_std_db: float = nan
     phase_std_deg: float = nan
+    delay_std_s: float = nan
     modulus_std: float = nan
 
 
@@ -67,13 +68,14 @@ def stability_margins(
     phases = [(_between(turned, p), float(np.exp(_between(log_f, p))), p) for p in at]
     wrapped = [((phase + pi) % (2.0 * pi) - pi, hz, p) for phase, hz, p in phases]
     phase, crossover_hz, place = min(wrapped, key=lambda one: abs(one[0]), default=(nan, nan, nan))
-    delay_s, delay_hz = min(((phase % (2.0 * pi) / (2.0 * pi * hz), hz) for phase, hz, _ in phases), default=(nan, nan))
+    delays = [(phase % (2.0 * pi) / (2.0 * pi * hz), hz, p) for phase, hz, p in phases]
+    delay_s, delay_hz, late = min(delays, default=(nan, nan, nan))
 
     nearest = int(np.argmin(np.abs(1.0 + loop)))
     return StabilityMargins(
-        gain_db=up[0],
+        gain_db=float(up[0]),
         gain_hz=up[1],
-        gain_down_db=-down[0],
+        gain_down_db=float(-down[0]),
         gain_down_hz=down[1],
         phase_deg=float(np.degrees(phase)),
         crossover_hz=crossover_hz,
@@ -82,8 +84,9 @@ def stability_margins(
         modulus=float(np.abs(1.0 + loop[nearest])),
         modulus_hz=float(frequency_hz[nearest]),
         # half of the power of a circular error lies along the radius, half across it
-        gain_std_db=DB_PER_NEPER * _between(relative, up[2]) / np.sqrt(2.0),
+        gain_std_db=float(DB_PER_NEPER * _between(relative, up[2]) / np.sqrt(2.0)),
         phase_std_deg=float(np.degrees(_between(relative, place)) / np.sqrt(2.0)),
+        delay_std_s=float(_between(relative, late) / (np.sqrt(8.0) * pi * delay_hz)),
         modulus_std=nan if std_error is None else float(std_error[nearest] / np.sqrt(2.0)),
     )
 

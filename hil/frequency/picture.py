@@ -123,11 +123,13 @@ def _phase(axis: Axes, one: ResponseCurve, twin: ResponseCurve) -> None:
 
 
 def _mark(magnitude: Axes, phase: Axes, margins: StabilityMargins) -> None:
-    """Mark crossover and gain margin of the measured loop."""
-    marks = (
+    """Mark crossover, gain margin and the crossing that bears least delay of the measured loop."""
+    marks = [
         (margins.crossover_hz, f"PM {digits(margins.phase_deg)}°"),
         (margins.gain_hz, f"GM {digits(margins.gain_db)} dB"),
-    )
+    ]
+    if margins.delay_hz != margins.crossover_hz:  # another crossing bears less delay
+        marks.append((margins.delay_hz, f"DM {digits(1e3 * margins.delay_s)} ms"))
     for hz, text in marks:
         if np.isfinite(hz):
             for axis in (magnitude, phase):

@@ -35,7 +35,7 @@ def _of_margins(title: str, one: StabilityMargins, twin: StabilityMargins) -> li
     rows = [
         _row(f"{title}: gain margin [dB]", one.gain_db, twin.gain_db, one.gain_std_db),
         _row(f"{title}: phase margin [deg]", one.phase_deg, twin.phase_deg, one.phase_std_deg),
-        _row(f"{title}: delay margin [ms]", 1e3 * one.delay_s, 1e3 * twin.delay_s),
+        _row(f"{title}: delay margin [ms]", 1e3 * one.delay_s, 1e3 * twin.delay_s, 1e3 * one.delay_std_s),
         _row(f"{title}: modulus margin", one.modulus, twin.modulus, one.modulus_std),
         _row(f"{title}: crossover [Hz]", one.crossover_hz, twin.crossover_hz),
     ]

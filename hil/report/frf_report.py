@@ -21,7 +21,8 @@ _CAPTIONS = (
         "open_loops",
         "Open loops and their margins",
         "The velocity loop with the position loop open, and the position loop around it, cut at its input. Dotted: "
-        "0 dB, -180°, crossover with the phase margin, and the frequency of the gain margin, of the measured loop.",
+        "0 dB, -180°, crossover with its phase margin (PM), gain margin (GM), and, if another crossing of 0 dB bears "
+        "less, the delay margin (DM) of the measured loop.",
     ),
     ("closed_loops", "Closed loops", "Velocity set-point to motor velocity; position set-point to position."),
 )

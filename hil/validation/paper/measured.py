@@ -28,7 +28,8 @@ def over_the_paper(result: FrequencyResponse, bench: Bench, folder: Path) -> lis
     held = -np.expm1(-s_t) / s_t  # hold of the torque, which the figures do not have
     drawings = [
         ("Fig. 9a", "paper_tf1.png", figures.bode_transfer(1), motor, motor.response / held,
-         "Fig. 9 a: motor angle over torque. The hold of the torque is taken out of the measured lines."),
+         "Fig. 9 a: motor angle over torque. The hold of the torque is taken out of the measured lines; "
+         "viscous friction, which the models of the figure do not have, turns their phase at low frequencies."),
         ("Fig. 9b", "paper_tf2.png", figures.bode_transfer(2), table,
          table.response / motor.response / bench.axis.ratio_m_rad, "Fig. 9 b: table over motor."),
     ]  # fmt: skip

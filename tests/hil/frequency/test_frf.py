@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from browser import CHROMIUM, NO_CHROMIUM, browser
 from command_line import hil as command
 from scipy.linalg import expm
@@ -44,7 +45,8 @@ def bench() -> hil.Bench:
 
 @pytest.fixture(scope="module")
 def recording(bench: hil.Bench) -> hil.Recording:
-    profile = hil.load_profile(ROOT / "profiles" / "frequency_response.yaml")
+    data = yaml.safe_load((ROOT / "profiles" / "frequency_response.yaml").read_text())
+    profile = hil.Profile.model_validate(data | {"segments": data["segments"][:3]})  # one way: planning takes seconds
     return hil.simulate(bench, hil.plan(profile, bench.period_s), seed=3)
 
 

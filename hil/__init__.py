@@ -64,6 +64,8 @@ if TYPE_CHECKING:
     from hil.diagnosis.result import Verdict
     from hil.errors import FieldError, HilError, InputError
     from hil.explanation import explain
+    from hil.frequency.measure import frf
+    from hil.frequency.result import FrequencyResponse
     from hil.identification.compare import Comparison, compare
     from hil.identification.friction import identify_friction
     from hil.importing.by_map import import_recording
@@ -95,6 +97,7 @@ _MODULE_OF = {
     "compare": "hil.identification.compare",
     "fit_nominal": "hil.api",
     "identify_friction": "hil.identification.friction",
+    "frf": "hil.frequency.measure",
     "diagnose": "hil.api",
     "explain": "hil.explanation",
     "design_experiment": "hil.api",
@@ -110,6 +113,7 @@ _MODULE_OF = {
     "Mechanism": "hil.twin.mechanism",
     "LIBRARY": "hil.twin.library",
     "Comparison": "hil.identification.compare",
+    "FrequencyResponse": "hil.frequency.result",
     "Diagnosis": "hil.diagnosis.diagnosis",
     "Verdict": "hil.diagnosis.result",
     # errors
@@ -131,6 +135,7 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "compare",
     "fit_nominal",
     "identify_friction",
+    "frf",
     "diagnose",
     "explain",
     "design_experiment",
@@ -145,6 +150,7 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "Mechanism",
     "LIBRARY",
     "Comparison",
+    "FrequencyResponse",
     "Diagnosis",
     "Verdict",
     "HilError",

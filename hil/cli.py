@@ -22,6 +22,7 @@ from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
 from hil.commands.explain import explain
 from hil.commands.export import export
+from hil.commands.frf import frf
 from hil.commands.friction import friction
 from hil.commands.guide import guide
 from hil.commands.identify import identify
@@ -93,6 +94,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("diagnose", diagnose),
     ("investigate", investigate),
     ("friction", friction),
+    ("frf", frf),
     ("paper", paper),
     ("prove", prove),
     ("validate", validate),

@@ -14,6 +14,7 @@ GUIDE = (
     "diagnosis",
     "wrong-axis",
     "profile",
+    "frequency-response",
     "drive",
     "real-time",
     "python",

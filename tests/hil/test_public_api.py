@@ -35,6 +35,7 @@ VERBS = [
     "compare",
     "fit_nominal",
     "identify_friction",
+    "frf",
     "diagnose",
     "explain",
     "design_experiment",
@@ -51,6 +52,7 @@ NOUNS = [
     "Mechanism",
     "LIBRARY",
     "Comparison",
+    "FrequencyResponse",
     "Diagnosis",
     "Verdict",
 ]

@@ -6,6 +6,7 @@ In natural coordinates by inverting ([J] s^2 + [C] s + [K]), in modal coordinate
 s = 2 pi i f. Responses are complex (k,) arrays.
 """
 
+from collections.abc import Callable
 from math import pi
 
 import numpy as np
@@ -17,6 +18,7 @@ from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import Modal, discretise
 
 ComplexArray = NDArray[np.complex128]
+SampledPlant = Callable[[ComplexArray], tuple[ComplexArray, ComplexArray]]
 
 
 def laplace(frequency_hz: FloatArray) -> ComplexArray:
@@ -84,30 +86,46 @@ def sampled_transfer(modal: Modal, period_s: float, z: ComplexArray) -> tuple[Co
 def sampled_closed_loop(modal: Modal, gains: Gains, frequency_hz: FloatArray, delay_ticks: int = 0) -> ComplexArray:
     """Position command to sampled table position under the law of `hil.control.cascade`, below its torque limit.
 
-    Exact for the sampled loops: the position loop runs every n-th tick and its output is held, so
-    that its samples see the inner loop at the n aliases of each frequency. The torque may act
-    `delay_ticks` late.
+    Exact for the sampled loops; the torque may act `delay_ticks` late. See `position_loop`.
+    """
+
+    def plant(z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        motor, table = sampled_transfer(modal, gains.period_s, z)
+        return motor / z**delay_ticks, table / z**delay_ticks
+
+    return position_loop(plant, gains, frequency_hz)[1]
+
+
+def position_loop(plant: SampledPlant, gains: Gains, frequency_hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Open position loop, cut at its input, and position command to sampled table position.
+
+    `plant` gives held torque to motor and table angle [rad/(N m)] at z = exp(s T). The position loop runs every n-th
+    tick and its output is held, so that its samples see the inner loop at the n aliases of each frequency; the open
+    loop is that of these samples and has the period 1 / (n T) over frequency.
     """
     ticks = gains.position_ticks
     z = np.exp(laplace(frequency_hz) * gains.period_s)
     aliases = [z * np.exp(2j * pi * m / ticks) for m in range(ticks)]
-    loops = [_held_velocity_loop(modal, gains, alias, delay_ticks) for alias in aliases]
+    loops = [_held_velocity_loop(plant, gains, alias) for alias in aliases]
     table = loops[0][1] / ticks
     feedback = sum(loop[int(gains.position_from_table)] for loop in loops) / ticks
+    opened = np.asarray(gains.position_gain_1_s * feedback, dtype=np.complex128)
     command = gains.position_gain_1_s + gains.velocity_feedforward * laplace(frequency_hz)
-    return np.asarray(table * command / (1.0 + gains.position_gain_1_s * feedback))
+    return opened, np.asarray(table * command / (1.0 + opened))
 
 
-def _held_velocity_loop(
-    modal: Modal, gains: Gains, z: ComplexArray, delay_ticks: int
-) -> tuple[ComplexArray, ComplexArray]:
-    """Velocity reference of the position loop to r theta of motor and table, hold of n ticks included."""
+def velocity_law(gains: Gains, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """PI law [N m s/rad] from the error of the velocity to the torque, and the law's velocity over position [1/s]."""
     period, coefficient = gains.period_s, gains.filter_coefficient
-    motor, table = sampled_transfer(modal, period, z)
     pi_law = gains.velocity_gain_n_m_s_rad + gains.integral_gain_n_m_rad * period / (z - 1.0)
-    pi_law = pi_law / z**delay_ticks
     difference = (1.0 - z**-2) / (2.0 * period) if gains.two_sample_mean else (1.0 - z**-1) / period
-    velocity = difference * coefficient / (1.0 - (1.0 - coefficient) / z)
+    return pi_law, difference * coefficient / (1.0 - (1.0 - coefficient) / z)
+
+
+def _held_velocity_loop(plant: SampledPlant, gains: Gains, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Velocity reference of the position loop to r theta of motor and table, hold of n ticks included."""
+    motor, table = plant(z)
+    pi_law, velocity = velocity_law(gains, z)
     hold = sum(z**-i for i in range(gains.position_ticks))
     torque = hold * pi_law / (1.0 + motor * pi_law * velocity)  # times r over v_ref
     return motor * torque, table * torque

@@ -37,6 +37,7 @@ def test_profiles_are_all_there() -> None:
             "reference_100mm_7",
             "reference_100mm_22",
             "reference_100mm_30",
+            "frequency_response",
             "friction_sweep",
             "reversal",
             "creep",

@@ -153,7 +153,7 @@ class Bench(BenchSection):
         if adds_torque and self.drive is not None and self.drive.mode is not DriveMode.CST:
             raise FieldError(
                 ("compensation", "entries"),
-                f"given a table that adds to the torque, allowed none in {self.drive.mode}, where the drive makes its own; "
+                f"given a table that adds to the torque, allowed none in {self.drive.mode}, where the drive makes it; "
                 "say enabled: false there, or drive.mode: cst",
             )
         return self

@@ -17,6 +17,7 @@ import typer
 from hil import __version__
 from hil.commands.bench import bench
 from hil.commands.compare import compare
+from hil.commands.compensate import compensate
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
@@ -75,6 +76,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("identify", identify),
     ("compare", compare),
     ("diagnose", diagnose),
+    ("compensate", compensate),
     ("investigate", investigate),
     ("friction", friction),
     ("paper", paper),

@@ -9,7 +9,6 @@ from hil.bench.bench_file import Bench
 from hil.compensating.shapes import Reach, shapes, thinned
 from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable, Over
 from hil.motion.trajectory import Trajectory
-from hil.twin.axis import Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import WIDTH, Moment, Stage
 from hil.twin.physics import Active

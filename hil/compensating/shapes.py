@@ -20,6 +20,7 @@ TURNS = 12  # at most, spread over the travel
 SPEEDS = 24  # knots of each direction, closer together at low speed: where friction changes most
 KNOTS = (2, 9, 33, 65, 129, 257, 513)  # of a table over angle or position; the fewest that are near enough
 NEAR = 0.02  # of the rms of a curve: what a table may leave of it
+_STRIDE = 11  # of the places over which the torque is averaged: prime to PER_TURN
 SLOWEST = 0.005  # of the largest velocity: the first knot of the velocity, and where torque changes its direction
 
 
@@ -93,7 +94,7 @@ def _over_velocity(twin: Twin, reach: Reach) -> CompensationTable:
     """Mean over the places; friction goes over from one direction to the other within the first knots about rest."""
     speeds = reach.direction_m_s * np.geomspace(1.0, 1.0 / SLOWEST, SPEEDS)
     at = np.concatenate([-speeds[::-1], speeds])
-    places = reach.places.ravel()
+    places = reach.places.ravel()[::_STRIDE]
     values = np.array([needed_torque(twin, places, float(speed)).mean() for speed in at])
     return CompensationTable("friction and load", Adds.TORQUE, Over.VELOCITY, at, values, values)
 

@@ -19,7 +19,7 @@ _coulomb, _drag, _scale, _bias = stages.coulomb, stages.drag, stages.friction_sc
 _share, _viscous_share = stages.table_share, stages.table_viscous_share
 _current, _torque, _motor_torque, _table_force = stages.current, stages.torque, stages.motor_torque, stages.table_force
 _Effects = stages.Effects
-INVERSIONS = 30  # of the drive: a torque constant that varies by half of itself is inverted to 1e-9
+INVERSIONS, INVERTED = 30, 1e-9  # of the drive, whose torque constant may vary by half of itself: steps, error
 
 
 @njit(cache=True, nogil=True, **COMPILE)
@@ -44,14 +44,18 @@ def steady(positions, speed, time_s, constants, modes, values, codes, memory):  
             own.mechanisms[:] = 0.0
             made = _motor_torque(_torque(_current(command, at, effects), at, effects), at, effects)
             command += goal - made
+            if abs(goal - made) <= INVERTED * abs(goal):
+                break
         needed[k] = command
     return needed, on_table
 
 
 @njit(cache=True, nogil=True, **COMPILE)
 def at_rest(positions, pushes, stroke, constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
-    """Readings of motor (n,) and table (n,) at rest with the motor at positions (n,) under pushes (n,) on the table [N],
-    the table of a rigid axis pulled there from `stroke` away [motor units]."""
+    """Readings of motor and table (n,) at rest with the motor at positions (n,) under pushes (n,) on the table [N].
+
+    The table of a rigid axis is pulled there from `stroke` away [motor units].
+    """
     own, motor, table = memory[0], np.empty(positions.size), np.empty(positions.size)
     shape = shapes_of(modes).motor[0]
     for k in range(positions.size):

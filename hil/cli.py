@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 
 from hil.commands.bench import bench
 from hil.commands.compare import compare
+from hil.commands.compensate import compensate
 from hil.commands.demo import demo
 from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
@@ -92,6 +93,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("identify", identify),
     ("compare", compare),
     ("diagnose", diagnose),
+    ("compensate", compensate),
     ("investigate", investigate),
     ("friction", friction),
     ("frf", frf),

@@ -13,9 +13,11 @@ from pydantic import Field, model_validator
 
 from hil.bench.axis_fields import BenchSection
 from hil.bench.axis_models import Axis, OneMass, model_of
+from hil.bench.compensation_section import CompensationSection
 from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
 from hil.bench.hardware import DriveMode, DriveSection, SimulationSection
 from hil.control import cascade as law
+from hil.control.compensation_tables import OFF, Adds, Compensation
 from hil.errors import FieldError
 from hil.files.shipped import given_or_shipped
 from hil.files.yaml_model import load_model
@@ -104,6 +106,9 @@ class Bench(BenchSection):
     )
     encoders: Encoders = Field(Encoders(), description="resolution and direction of the encoders")
     mechanisms: tuple[MechanismEntry, ...] = Field((), description="mechanisms that the twin of this bench contains")
+    compensation: CompensationSection | None = Field(
+        None, description="what the controller adds to torque and position set-point; absent: nothing"
+    )
     drive: DriveSection | None = Field(None, description="bus, drive and supervision; absent: recordings only")
     simulation: SimulationSection | None = Field(None, description="present: the devices are simulated")
 
@@ -141,6 +146,23 @@ class Bench(BenchSection):
                 "given table, allowed motor: this bench has no linear encoder; describe it under encoders.table",
             )
         return self
+
+    @model_validator(mode="after")
+    def _torque_is_commanded(self) -> Self:
+        adds_torque = any(table.adds is Adds.TORQUE for table in self.tables().tables)
+        if adds_torque and self.drive is not None and self.drive.mode is not DriveMode.CST:
+            raise FieldError(
+                ("compensation", "entries"),
+                f"given a table that adds to the torque, allowed none in {self.drive.mode}, where the drive makes it; "
+                "say enabled: false there, or drive.mode: cst",
+            )
+        return self
+
+    def tables(self) -> Compensation:
+        """Tables of the compensation; none if it is off."""
+        if self.compensation is None:
+            return OFF
+        return self.compensation.compensation(self.axis.physics().angle_per_unit / self.axis.ratio_m_rad)
 
     @property
     def gains(self) -> law.Gains:

@@ -18,7 +18,8 @@ from hil.errors import HilError
 
 PACKAGE = Path(__file__).parents[1]
 # All that is compiled or gives a kernel its types and constants; a test compares it with the imports of numba.
-_OF_THE_LOOP = tuple(f"hil/loop/{name}.py" for name in ("checks", "cycle", "limits", "sign_check", "virtual"))
+_MODULES = ("checks", "columns", "cycle", "limits", "sign_check", "virtual")
+_OF_THE_LOOP = tuple(f"hil/loop/{name}.py" for name in _MODULES)
 SOURCES = ("hil/compiled", "hil/control", "hil/twin", *_OF_THE_LOOP, "drivers/sim")
 # Versions and worktrees that share NUMBA_CACHE_DIR or the user's cache; a folder takes some 10 MB.
 KEPT = 8

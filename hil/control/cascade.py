@@ -1,7 +1,7 @@
 """Cascaded servo control: P position loop with velocity feed-forward around a PI velocity loop.
 
     position loop, every n-th tick   v_ref = Kv (x_cmd - x) + ff v_cmd                      [m/s]
-    velocity loop, every tick        e = v_ref / r - v,   y = Kp e + I,   u = clip(y, +-limit)
+    velocity loop, every tick        e = v_ref / r - v,   y = Kp e + I + u_ff,   u = clip(y, +-limit)
                                      I <- I + (Kp / Ti) e T unless |y| >= limit             [N m]
 
 r = lead / 2 pi in m/rad (1 on a linear axis); v is a difference of the motor encoder. The current loop
@@ -59,6 +59,7 @@ class Inputs(NamedTuple):
     velocity_command_m_s: float
     motor_position_rad: float
     table_position_m: float
+    torque_feedforward_n_m: float = 0.0  # u_ff, of a compensation
 
 
 class Outputs(NamedTuple):
@@ -150,6 +151,8 @@ def step(gains: Gains, state: State, inputs: Inputs) -> tuple[State, Outputs]:
         )
     error = reference / gains.ratio_m_rad - velocity
     wanted = rounded(gains.velocity_gain_n_m_s_rad * error) + state.integral_n_m
+    if inputs.torque_feedforward_n_m != 0.0:  # -0 + 0 is another bit
+        wanted += inputs.torque_feedforward_n_m
     limit = gains.torque_limit_n_m
     integral = state.integral_n_m
     if abs(wanted) < limit:
@@ -173,7 +176,7 @@ def replay(
     torque = np.empty(n)
     reference = np.empty(n)
     for k in range(n):
-        inputs = Inputs(position_command_m[k], velocity_command_m_s[k], motor_position_rad[k], table_position_m[k])
+        inputs = Inputs(position_command_m[k], velocity_command_m_s[k], motor_position_rad[k], table_position_m[k], 0.0)
         state, outputs = step(gains, state, inputs)
         torque[k] = outputs.torque_n_m
         reference[k] = outputs.velocity_reference_m_s

@@ -224,6 +224,7 @@ def _imagined(truth: _Alternative, trajectory: Trajectory, like: Measured) -> Me
         table_m=answer.table_position_m if like.table_m.size else like.table_m,
         torque_command=answer.torque_command,
         torque=answer.torque if like.observability.torque_and_command else answer.torque_command,
+        feedforward=np.empty(0),
     )
 
 

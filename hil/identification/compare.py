@@ -214,7 +214,11 @@ def _figures_of(measured: Measured, data: Dataset, hypothesis: Hypothesis) -> di
 def _closed_loop(measured: Measured, bench: Bench) -> tuple[list[Deviation], float]:
     """Deviations in closed loop, none if the twin is unstable, and the datum of the linear encoder [m]."""
     response = bench.twin().simulate(
-        measured.position_command_m, measured.velocity_command_m_s, measured.start, measured.table_m
+        measured.position_command_m,
+        measured.velocity_command_m_s,
+        measured.start,
+        measured.table_m,
+        feedforward=measured.feedforward,
     )
     if not stays(
         differences(measured.response, response, bench, measured.evaluated), measured.response, measured.evaluated

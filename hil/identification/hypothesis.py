@@ -234,7 +234,9 @@ class Hypothesis:
     def respond(self, run: Measured) -> Response:
         """Response of the twin in closed loop to the set-points of a run. Raises FieldError without a control law."""
         _ = self.bench.known_control  # raises
-        return self.twin(run=run).simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m)
+        return self.twin(run=run).simulate(
+            run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, feedforward=run.feedforward
+        )
 
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
@@ -251,7 +253,9 @@ class Hypothesis:
         """
         twin = self.twin(observer_s, fast, run)
         measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
-        predicted = twin.observe(run.position_command_m, run.velocity_command_m_s, measured, run.start, rest)
+        predicted = twin.observe(
+            run.position_command_m, run.velocity_command_m_s, measured, run.start, rest, run.feedforward
+        )
         residuals = differences(measured, predicted, self.bench, run.evaluated)
         residuals["command"] = measured.torque_command - predicted.torque_command
         return residuals | {name: np.zeros(run.motor.size) for name in run.observability.hidden}

@@ -39,12 +39,16 @@ _FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity
 
 _CHANNELS = (
     "position_command_m", "velocity_command_m_s", "motor", "table_m", "torque_command", "torque", "speed_set_point",
+    "feedforward",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A recording prepared for the comparison, channels (n,) in motor units: rad and N m, or m and N."""
+    """A recording prepared for the comparison, channels (n,) in motor units: rad and N m, or m and N.
+
+    The set-points are those that the control law used, with the correction of a compensation.
+    """
 
     name: str
     kind: AxisKind
@@ -59,6 +63,7 @@ class Measured:
     noise: Noise
     observability: Observability
     speed_set_point: FloatArray = field(default_factory=lambda: np.empty(0))  # of unknown scale; empty if not recorded
+    feedforward: FloatArray = field(default_factory=lambda: np.empty(0))  # torque of a compensation; empty: none
     lead_in: int = 0  # first rows, which give the twin its state and are not evaluated
 
     @cached_property
@@ -89,6 +94,11 @@ class Measured:
     def response(self) -> Response:
         """The measured channels in the twin's order."""
         return Response(self.motor, self.table_m, self.torque_command, self.torque)
+
+    @property
+    def own_command(self) -> FloatArray:
+        """Torque command (n,) of the control law itself, without that of a compensation."""
+        return self.torque_command - self.feedforward if self.feedforward.size else self.torque_command
 
     def until(self, row: int) -> "Measured":
         """The rows before `row`."""
@@ -147,6 +157,11 @@ def take(recording: Recording, bench: Bench) -> Measured:
         )
     motor, torque = _column(recording, names.motor_position), _column(recording, names.torque)
     position, velocity = _column(recording, names.position_command), _column(recording, names.velocity_command)
+    feedforward = np.empty(0)
+    if "compensation_position_m" in recording.columns:  # the loop records all three
+        position = position + _column(recording, "compensation_position_m")
+        velocity = velocity + _column(recording, "compensation_velocity_m_s")
+        feedforward = _column(recording, f"compensation_{names.torque}")
     if bench.differences_setpoints:
         velocity = last_difference(position, gains.period_s)
     if bench.setpoint_delay_s:
@@ -158,16 +173,17 @@ def take(recording: Recording, bench: Bench) -> Measured:
         # the linear encoder closes the position loop: the datum of the motor encoder is arbitrary
         motor = motor + float(np.mean(table - gains.ratio_m_rad * motor)) / gains.ratio_m_rad
     feedback = table if table.size else gains.ratio_m_rad * motor
-    first = _first_tick(gains, (position, velocity, motor, feedback), command) if bench.law_known else 0
-    position, velocity, motor, feedback, table, command, torque = (
-        values[first:] for values in (position, velocity, motor, feedback, table, command, torque)
+    own = command - feedforward if feedforward.size else command  # that of the law itself
+    first = _first_tick(gains, (position, velocity, motor, feedback), own) if bench.law_known else 0
+    position, velocity, motor, feedback, table, command, torque, own, feedforward = (
+        values[first:] for values in (position, velocity, motor, feedback, table, command, torque, own, feedforward)
     )
     speed = _column(recording, SPEED_SET_POINT)[first:] if SPEED_SET_POINT in recording.columns else np.empty(0)
     noise = estimate_noise(bench, velocity, motor, table, command, torque, recording.period_s)
     known = observability(recording, bench)
     if not known.position_measured:
         noise = replace(noise, motor=recording.period_s * white_noise(_column(recording, names.motor_velocity)))
-    start = _start(gains, (position, velocity, motor, feedback), command)
+    start = _start(gains, (position, velocity, motor, feedback), own)
     return Measured(
         name=recording.name,
         kind=recording.kind,
@@ -182,6 +198,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
         noise=noise,
         observability=known,
         speed_set_point=speed if np.any(speed) else np.empty(0),
+        feedforward=feedforward,
         lead_in=max(int(recording.metadata.get(LEAD_IN, 0)) - first, 0),
     )
 

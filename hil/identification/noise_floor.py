@@ -64,7 +64,9 @@ def noise_response(hypothesis: Hypothesis, run: Measured) -> dict[str, float]:
     )
 
     def moved(share: float) -> dict[str, float]:
-        other = twin.simulate(run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, share * misread)
+        other = twin.simulate(
+            run.position_command_m, run.velocity_command_m_s, run.start, run.table_m, share * misread, run.feedforward
+        )
         return {
             name: rms((a - b)[run.evaluated])
             for name, a, b in (

@@ -8,7 +8,8 @@ from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
 from hil.channels import AxisKind
 from hil.control.cascade import Gains
-from hil.loop.cycle import Cycle, Setpoint, Watch
+from hil.loop.columns import Setpoint, Watch
+from hil.loop.cycle import Cycle
 from hil.loop.devices import Devices, Rig
 from hil.loop.limits import Bounds
 from hil.loop.stall import acceleration_m_s2
@@ -91,5 +92,6 @@ def make_cycle(rig: Devices, motor_position: float, limits: MotionLimits | None 
     """Controller, twin and checks of a bench, for an axis at rest at this motor position [rad, m]."""
     bench = rig.bench
     kind = AxisKind.LINEAR if bench.axis.linear else AxisKind.ROTARY
-    watch = Watch(_SETPOINTS[rig.section.mode], make_bounds(rig, limits))
-    return Cycle(bench.twin(), kind, watch, motor_position)
+    tables = bench.tables()
+    watch = Watch(_SETPOINTS[rig.section.mode], make_bounds(rig, limits), bool(tables.tables))
+    return Cycle(bench.twin(), kind, watch, motor_position, tables)

@@ -8,9 +8,7 @@ measured as the mean until tick k + 1, so a row is complete one tick later; two 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from enum import IntEnum
+from dataclasses import asdict
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -19,78 +17,14 @@ from numba import njit, typeof
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.control import cascade
+from hil.control import cascade, compensation
+from hil.control.compensation_tables import OFF, Compensation, Packed, pack
 from hil.loop.checks import check
-from hil.loop.limits import Bounds, Facts, Limit, Memory
+from hil.loop.columns import Column, Setpoint, Watch
+from hil.loop.limits import Facts, Limit, Memory
 from hil.motion.trajectory import Trajectory
 from hil.twin.axis import Start, Twin
 from hil.twin.stepping import kernel
-
-
-class Setpoint(IntEnum):
-    """Quantity commanded to the drive: torque (both loops here), velocity (position loop here), or position."""
-
-    TORQUE = 0
-    VELOCITY = 1
-    POSITION = 2
-
-
-@dataclass(frozen=True)
-class Watch:
-    """Quantity commanded to the drive, and bounds of the checks."""
-
-    setpoint: Setpoint
-    bounds: Bounds
-
-
-def _always(watch: Watch) -> bool:
-    return True
-
-
-def _with_table(watch: Watch) -> bool:
-    return watch.bounds.has_table
-
-
-def _with_velocity_loop(watch: Watch) -> bool:
-    return watch.setpoint is Setpoint.TORQUE
-
-
-def _with_position_loop(watch: Watch) -> bool:
-    return watch.setpoint is not Setpoint.POSITION
-
-
-class Column(IntEnum):
-    """Columns of a row, in order: channel (fields of `hil.channels.AxisChannels` in braces) and its condition.
-
-    A new channel is one line here and one line in `cycle`.
-    """
-
-    channel: str
-    present: Callable[[Watch], bool]
-
-    def __new__(cls, channel: str, present: Callable[[Watch], bool] = _always) -> Column:
-        column = int.__new__(cls, len(cls.__members__))
-        column._value_ = len(cls.__members__)
-        column.channel, column.present = channel, present
-        return column
-
-    TIME = "time_s"
-    POSITION_COMMAND = "{position_command}"
-    VELOCITY_COMMAND = "{velocity_command}"
-    ACCELERATION_COMMAND = "acceleration_command_m_s2"
-    MOTOR = "{motor_position}"
-    TABLE = "{table_position}", _with_table
-    TORQUE_COMMAND = "{torque_command}", _with_velocity_loop
-    TORQUE = "{torque}"
-    VELOCITY_REFERENCE = "velocity_reference_m_s", _with_position_loop
-    TWIN_MOTOR = "twin_{motor_position}"
-    TWIN_TABLE = "twin_{table_position}", _with_table
-    TWIN_TORQUE = "twin_{torque}"
-    DRIVE_STATE = "drive_state"
-    ERROR_CODE = "drive_error_code"
-    SEGMENT = "segment"
-    LATENESS = "lateness_s"
-    CYCLE = "cycle_s"
 
 
 class Samples(NamedTuple):
@@ -127,20 +61,37 @@ class Loop(NamedTuple):
     twin: tuple[Any, ...]  # arrays of the kernel, with modal state and memory at the end
     rows: FloatArray  # (2, columns + 1): in turn; values of absent columns go to the last place
     place: np.ndarray[Any, np.dtype[np.int64]]  # (len(Column),): place of each column in a row
+    tables: Packed  # of the compensation; without any, it is off
+    added: FloatArray  # (len(compensation.Place),) its state
 
 
-_read, _advance, _step = kernel.read, kernel.advance, cascade.step
+_read, _advance, _step, _compensate = kernel.read, kernel.advance, cascade.step, compensation.step
+_Added = compensation.Added
 STOP_SEGMENT = -1  # in the recording: set-points of a stop
 _TO_TORQUE, _TO_VELOCITY = int(Setpoint.TORQUE), int(Setpoint.VELOCITY)
 _NOT_FINITE = int(Limit.NOT_FINITE)
 
 
+@njit(_nrt=False, error_model="numpy")
+def _inputs(position, velocity, added, motor, table):  # type: ignore[no-untyped-def]
+    return cascade.Inputs(position + added.position_m, velocity + added.velocity_m_s, motor, table, added.torque)
+
+
+@njit(_nrt=False, error_model="numpy")
+def _added(setpoints, index, loop):  # type: ignore[no-untyped-def]
+    """What the compensation adds at a set-point; nothing more in a controlled stop."""
+    if loop.tables.layout.shape[0] == 0:
+        return _Added(0.0, 0.0, 0.0)
+    wanted = setpoints[index, 3] != STOP_SEGMENT
+    return _compensate(loop.tables, loop.added, setpoints[index, 0], setpoints[index, 1], setpoints[index, 2], wanted)
+
+
 @njit(_nrt=False, error_model="numpy")  # no references counted: see hil.twin.stepping.kernel
-def _control(law, position, velocity, motor, table):  # type: ignore[no-untyped-def]
+def _control(law, position, velocity, added, motor, table):  # type: ignore[no-untyped-def]
     """Compute a step of `hil.control.cascade`, the state kept in an array."""
     state = law.state
     before = cascade.State(int(state[0]), state[1], state[2], state[3], state[4], state[5])
-    after, out = _step(law.gains, before, cascade.Inputs(position, velocity, motor, table))
+    after, out = _step(law.gains, before, _inputs(position, velocity, added, motor, table))
     state[0], state[1], state[2] = after.tick, after.velocity_reference_m_s, after.integral_n_m
     state[3], state[4] = after.previous_motor_rad, after.previous2_motor_rad
     state[5] = after.filtered_velocity_rad_s
@@ -159,9 +110,10 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     finite = abs(motor) + abs(table) + abs(torque) < np.inf
     if not finite:  # the row repeats the one before: the recording stays readable, the law's state a number
         motor, table, torque = before[place[Column.MOTOR]], before[place[Column.TABLE]], row[place[Column.TORQUE]]
-    command, reference = _control(loop.law, position, velocity, motor, table)
+    added = _added(setpoints, index, loop)
+    command, reference = _control(loop.law, position, velocity, added, motor, table)
     twin_motor, twin_table = _read(*loop.twin)
-    twin_command, _ = _control(loop.twin_law, position, velocity, twin_motor, twin_table)
+    twin_command, _ = _control(loop.twin_law, position, velocity, added, twin_motor, twin_table)
     twin_torque = _advance(twin_command, *loop.twin)
     before[place[Column.TORQUE]] = torque
     before[place[Column.CYCLE]] = samples.cycle_s
@@ -174,6 +126,9 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     row[place[Column.TABLE]] = table
     row[place[Column.TORQUE_COMMAND]] = command
     row[place[Column.VELOCITY_REFERENCE]] = reference
+    row[place[Column.ADDED_POSITION]] = added.position_m
+    row[place[Column.ADDED_VELOCITY]] = added.velocity_m_s
+    row[place[Column.ADDED_TORQUE]] = added.torque
     row[place[Column.TWIN_MOTOR]] = twin_motor
     row[place[Column.TWIN_TABLE]] = twin_table
     row[place[Column.TWIN_TORQUE]] = twin_torque
@@ -183,6 +138,7 @@ def compiled_cycle(tick, first, samples, setpoints, loop):  # type: ignore[no-un
     ratio = gains.ratio_m_rad
     actual = ratio * motor
     fed_back = table if gains.position_from_table else actual
+    position, velocity = position + added.position_m, velocity + added.velocity_m_s  # what the loop follows
     facts = Facts(position, velocity, actual, table, fed_back, torque, command, reference,
                   ratio * twin_motor, twin_table, twin_torque,
                   samples.motor_age, samples.table_age, samples.skipped, gains.period_s,
@@ -203,7 +159,8 @@ def compiled_skip(first, last, begin, motor, setpoints, loop):  # type: ignore[n
     for tick in range(first, last + 1):
         index = min(tick - begin, setpoints.shape[0] - 1)
         twin_motor, twin_table = _read(*loop.twin)
-        command, _ = _control(loop.twin_law, setpoints[index, 0], setpoints[index, 1], twin_motor, twin_table)
+        added = _added(setpoints, index, loop)
+        command, _ = _control(loop.twin_law, setpoints[index, 0], setpoints[index, 1], added, twin_motor, twin_table)
         _advance(command, *loop.twin)
     state, count = loop.law.state, last + 1 - first
     state[0] += count
@@ -214,7 +171,9 @@ def compiled_skip(first, last, begin, motor, setpoints, loop):  # type: ignore[n
 class Cycle:
     """Controller, live twin and rows of one run, for an axis at rest at `motor_position` [rad or m]."""
 
-    def __init__(self, twin: Twin, kind: AxisKind, watch: Watch, motor_position: float) -> None:
+    def __init__(
+        self, twin: Twin, kind: AxisKind, watch: Watch, motor_position: float, tables: Compensation = OFF
+    ) -> None:
         names = asdict(AXIS_CHANNELS[kind])
         present = [column for column in Column if column.present(watch)]
         self.channels = tuple(column.channel.format(**names) for column in present)
@@ -236,9 +195,12 @@ class Cycle:
             (*twin.arrays(), delta, memory),
             rows,
             place,
+            pack(tables, gains.period_s),
+            compensation.start(),
         )
+        self._start_m = ratio * motor_position
         law, twin_law = self.loop.law.state, self.loop.twin_law.state
-        self.state_arrays = (law, twin_law, delta, memory, rows, self.loop.memory)  # changed by a step
+        self.state_arrays = (law, twin_law, delta, memory, rows, self.loop.memory, self.loop.added)  # changed by a step
         self.first_tick = 0  # of the set-points
         self.setpoints = np.array([[ratio * motor_position, 0.0, 0.0, 0.0]])
         # Compiled for these types here; a call of the result omits the look-up of types, which takes 3 us for records.
@@ -251,6 +213,8 @@ class Cycle:
         """Take set-points that begin at `first_tick`. segment: number recorded instead of the trajectory's own."""
         segments = trajectory.segment if segment is None else np.full(len(trajectory), segment)
         self.first_tick = first_tick
+        if self.loop.law.gains.position_from_table and first_tick == 0:  # the zero of the motor encoder is another one
+            self.loop.added[compensation.Place.DATUM] = trajectory.position_m[0] - self._start_m
         self.setpoints = np.column_stack(
             (trajectory.position_m, trajectory.velocity_m_s, trajectory.acceleration_m_s2, segments)
         ).astype(np.float64, order="C", copy=False)

@@ -12,6 +12,7 @@ GUIDE = (
     "start",
     "recording",
     "diagnosis",
+    "compensate",
     "wrong-axis",
     "profile",
     "frequency-response",

@@ -133,13 +133,15 @@ class Twin:
         start: Start = _AT_REST,
         measured_table_m: FloatArray = _NOTHING,
         misread: FloatArray = _RIGHT,
+        feedforward: FloatArray = _NOTHING,
     ) -> Response:
         """Simulate the axis in closed loop over set-points (n,), one per control tick, from `start`.
 
         `measured_table_m` (n,) holds a table that floats in a gap, see `hil.twin.stepping.loops`. `misread` (2, n):
-        error of the motor encoder [motor units] and of the table encoder [m] that the controller sees.
+        error of the motor encoder [motor units] and of the table encoder [m] that the controller sees. `feedforward`
+        (n,): torque that a compensation adds; empty: none.
         """
-        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s, feedforward)
         controller, axis = self._controller(start), self._axis(start)
         channels = loops.closed_loop(
             self.loop_gains, controller, setpoints, misread, measured_table_m, self.push_n, axis
@@ -158,14 +160,15 @@ class Twin:
         measured: Response,
         start: Start = _AT_REST,
         resting: NDArray[np.bool_] | None = None,
+        feedforward: FloatArray = _NOTHING,
     ) -> Response:
         """Simulate the axis block by block, each on measured inputs; see `hil.twin.stepping.loops`.
 
         `measured.table_position_m` is empty without a linear encoder. `resting` (n,) marks the rows at which the motor
         rests; by default those at which its measured position hardly changes. Recorded lateness of a channel must have
-        been undone, see `undelayed`.
+        been undone, see `undelayed`. `feedforward` as in `simulate`.
         """
-        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s, feedforward)
         if resting is None:
             passed = np.abs(np.diff(measured.motor_position, prepend=measured.motor_position[:1]))
             resting = passed <= self.slow_velocity * self.gains.period_s
@@ -189,7 +192,7 @@ class Twin:
         start: Start = _AT_REST,
     ) -> FloatArray:
         """Torque command (n,) of the controller alone, fed measured inputs as in `observe`."""
-        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s)
+        setpoints = loops.Setpoints(position_command_m, velocity_command_m_s, _NOTHING)
         return np.asarray(
             loops.replay_law(self.loop_gains, self._controller(start), setpoints, Response(*measured)), dtype=np.float64
         )

@@ -147,7 +147,7 @@ def _law_rows(run: Measured, by_loop: bool) -> LawRows:
     return LawRows(
         run.position_command_m,
         run.velocity_command_m_s,
-        run.response,
+        run.response._replace(torque_command=run.own_command),
         run.speed_set_point if by_loop else np.empty(0),
         run.start,
         run.evaluated.start,

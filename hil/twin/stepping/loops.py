@@ -26,10 +26,18 @@ _read, _advance = kernel.read, kernel.advance
 
 
 class Setpoints(NamedTuple):
-    """Commands of the table (n,), one per control tick."""
+    """Commands of the table (n,), one per control tick, and the torque of a compensation (n,); (0,): none."""
 
     position_m: FloatArray
     velocity_m_s: FloatArray
+    torque: FloatArray
+
+
+@njit(**COMPILE)
+def _inputs(setpoints, k, motor, table):  # type: ignore[no-untyped-def]
+    """Inputs of the controller at tick k, with the positions that it sees."""
+    torque = setpoints.torque[k] if setpoints.torque.size else 0.0
+    return cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], motor, table, torque)
 
 
 @njit(**COMPILE)
@@ -66,7 +74,7 @@ def closed_loop(gains, state, setpoints, misread, measured_table, push, axis):  
         if misread.size:
             seen_motor += misread[0, k]
             seen_table += misread[1, k]
-        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], seen_motor, seen_table)
+        inputs = _inputs(setpoints, k, seen_motor, seen_table)
         state, outputs = _control_step(gains, state, inputs)
         command[k] = outputs.torque_n_m
         if told > 0 and own.floating > 0.0:
@@ -103,7 +111,7 @@ def replay_law(gains, state, setpoints, measured):  # type: ignore[no-untyped-de
     seen = motor * gains.ratio_m_rad if table.size == 0 else table
     wanted = np.empty(command.size)
     for k in range(command.size):
-        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], motor[k], seen[k])
+        inputs = _inputs(setpoints, k, motor[k], seen[k])
         state, wanted[k] = _follow(gains, state, inputs, command[k], gains.period_s)
     return wanted
 
@@ -134,7 +142,7 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
     hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
-        inputs = cascade.Inputs(setpoints.position_m[k], setpoints.velocity_m_s[k], measured_motor[k], seen[k])
+        inputs = _inputs(setpoints, k, measured_motor[k], seen[k])
         state, wanted[k] = _follow(gains, state, inputs, command[k], c.period)
         error = measured_motor[k] - motor[k]
         _correct(shapes.motor_impulse, error, c.period, c.observer, delta)

@@ -15,7 +15,7 @@ STROKE = 10.0  # so much of it [motor units]: more than any play
 
 @njit(cache=True, nogil=True, **COMPILE)
 def settle(constants, modes, values, codes, delta, memory):  # type: ignore[no-untyped-def]
-    """Put the table to its rest under the loads and the transmission at the start, with the motor held.
+    """Put the table to its rest under the loads, `memory.push` [N] and the transmission, with the motor held.
 
     Quasi-static, in the elastic modes: delta_i = g_i / w_i^2, w^2 = (1 - a11) / b1 of the exact discretisation. The
     deflection of the transmission is found by bisection: the torque that it carries grows with it. Late and
@@ -23,12 +23,12 @@ def settle(constants, modes, values, codes, delta, memory):  # type: ignore[no-u
     """
     c, own, on, shapes, step = constants[0], memory[0], codes[0], shapes_of(modes), step_of(modes, False)
     own.carried = along(shapes.motor, delta[0])
-    if not (on.transmission or on.table_force):
+    if not (on.transmission or on.table_force or own.push != 0.0):
         return
     effects = _Effects(values, on, own.mechanisms)
     at_motor, at_table, at_spring, at_screw = shapes.motor, shapes.table, shapes.spring, shapes.screw
     at = moment(c, 0.0, 0.0, 0.0, along(at_motor, delta[0]), 0.0, along(at_table, delta[0]) * c.ratio)
-    push = _table_force(0.0, at, effects) * c.ratio
+    push = _table_force(own.push, at, effects) * c.ratio
     stiffer = c.screw * (_screw(1.0, at, effects) - 1.0)
     soft = np.zeros(at_motor.size)  # 1 / w^2 of each elastic mode
     spring_push = spring_spring = spring_screw = screw_push = screw_screw = 0.0

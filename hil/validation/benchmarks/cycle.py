@@ -12,10 +12,13 @@ from time import perf_counter_ns
 import can
 
 from drivers.bus import BusConfig, open_bus
+from hil.bench.bench_file import load_bench
 from hil.loop.bounds import make_cycle
 from hil.loop.clock import VirtualClock
+from hil.loop.cycle import Samples
 from hil.loop.devices import Rig
 from hil.loop.session import Session
+from hil.manual.keys import EXAMPLES
 from hil.recording.writer import Recorder
 from hil.validation.benchmarks.axis import MOVES, trajectory, twenty_modes
 from hil.validation.benchmarks.figure import Figure, Reference, ReferenceKind, percentile
@@ -125,6 +128,9 @@ def figures() -> list[Figure]:
     apart = f"twin of 20 modes; without the {1e6 * percentile(devices, 0.5):.0f} us of the simulated devices"
     bus = "whole cycle, python-can virtual bus"
 
+    plain, compensated = compensated_steps()
+    steps = f"compiled step: {1e6 * plain:.1f} us without, {1e6 * compensated:.1f} us with four tables, in turn"
+
     def figure(name: str, label: str, seconds: list[float], part: float, target: float | None, how: str) -> Figure:
         quantile = f", p{100 * part:.0f}"
         return Figure(name + quantile, label + quantile, 1e6 * percentile(seconds, part), "us", target, True, how)
@@ -138,4 +144,25 @@ def figures() -> list[Figure]:
             figure(f"{bus}, devices included", "cycle + devices", both, 0.5, None, "both ends of the python-can bus"),
             beside=(ends,),
         ),
+        Figure("compensation, four tables", "compensation", 1e6 * (compensated - plain), "us", 1.0, True, steps),
     ]
+
+
+def compensated_steps(repeats: int = 20_000) -> tuple[float, float]:
+    """Return the median times [s] of the compiled step of a cycle without and with every kind of table, in turn."""
+    plain = twenty_modes("inprocess")
+    section = load_bench(EXAMPLES / "bench-compensated.yaml").compensation
+    limits, motion = MOVES.motion_limits, trajectory(plain.gains.period_s)
+    cycles = []
+    for bench in (plain, plain.model_copy(update={"compensation": section})):
+        with Rig(bench, plant=StandingAxis()) as rig:
+            rig.set_up()
+            cycles.append(make_cycle(rig, 0.0, limits))
+        cycles[-1].follow(motion)
+    samples, durations = Samples(0.0, 0.0, 0.0, 0, 0, 0.0, 0.0), ([], [])  # type: ignore[var-annotated]
+    for tick in range(repeats):
+        for cycle, taken in zip(cycles, durations, strict=True):
+            start_ns = perf_counter_ns()
+            cycle.step(tick % len(motion), samples)
+            taken.append(1e-9 * (perf_counter_ns() - start_ns))
+    return percentile(durations[0], 0.5), percentile(durations[1], 0.5)

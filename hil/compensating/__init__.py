@@ -1,0 +1,1 @@
+"""From a diagnosed bench to the compensation of its axis."""

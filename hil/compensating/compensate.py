@@ -1,0 +1,113 @@
+"""A compensation of a diagnosed bench: its tables, the gain that each promises, and the section of the bench file."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.bench.bench_file import Bench
+from hil.compensating.derive import Derived, derive, reach_of
+from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of, predict
+from hil.compensating.shapes import shapes
+from hil.control.compensation_tables import Adds, Compensation, CompensationTable
+from hil.diagnosis.result import Result
+from hil.errors import HilError
+from hil.motion.trajectory import Trajectory
+
+DRAWS = 12  # of the parameters: the largest of 12 is passed by one draw in 13
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A compensation with its gain on a motion; `alone`: errors with each table alone; `errors`: standard errors."""
+
+    derived: Derived
+    gain: Gain
+    alone: dict[str, Errors]
+    errors: dict[str, float]
+
+    @property
+    def compensation(self) -> Compensation:
+        """The tables."""
+        return self.derived.compensation
+
+    @property
+    def harms(self) -> list[str]:
+        """What the compensation may make worse, in words; empty: nothing."""
+        names = {Adds.TORQUE: "following error", Adds.POSITION: "positioning error"}
+        told = []
+        for adds in dict.fromkeys(table.adds for table in self.compensation.tables):
+            low, high = self.gain.interval(adds)
+            if high >= 1.0:
+                told.append(f"the {names[adds]} becomes {low:.2f} to {high:.2f} of what it is")
+        return told
+
+
+def plan_compensation(bench: Bench, motion: Trajectory, result: Result | None, fade_in_s: float) -> Plan:
+    """Derive the compensation of a bench and predict its gain; `result`: of the diagnosis, for the standard errors.
+
+    Raises HilError where nothing is to be compensated or the motion is shorter than the fade-in.
+    """
+    if motion.duration_s <= 2.0 * fade_in_s:
+        raise HilError(
+            f"given a motion of {motion.duration_s:g} s, allowed more than {2.0 * fade_in_s:g} s: the compensation "
+            "takes half of that to fade in; give a longer --profile or a shorter --fade-in"
+        )
+    bench = bench.model_copy(update={"compensation": None})
+    reach = reach_of(bench, motion)
+    derived = derive(bench, reach, fade_in_s)
+    compensation = derived.compensation
+    if not compensation.tables:
+        raise HilError("nothing of this bench can be compensated by a table")
+    drawn = tuple(drawn_benches(bench, result, DRAWS)) if result is not None else ()
+    gain = gain_of(bench, motion, compensation, drawn, fade_in_s)
+    alone = {
+        table.name: predict(bench, motion, replace(compensation, tables=(table,)), fade_in_s)
+        for table in compensation.tables
+    }
+    return Plan(derived, gain, alone, _errors(bench, drawn, derived, motion))
+
+
+def _errors(bench: Bench, drawn: tuple[Bench, ...], derived: Derived, motion: Trajectory) -> dict[str, float]:
+    """Largest standard error of a value of each table, from the draws."""
+    if not drawn:
+        return {}
+    reach, from_table = reach_of(bench, motion), bench.gains.position_from_table
+    found = [shapes(one.twin(), reach, from_table) for one in drawn]
+
+    def error(name: str) -> float:
+        columns = np.array([(one[name].forward, one[name].backward) for one in found])
+        return float(np.std(columns, axis=0, ddof=1).max())
+
+    return {table.name: error(table.name) for table in derived.compensation.tables}
+
+
+def section_of(plan: Plan, source: Path, date: str) -> dict[str, Any]:
+    """The section `compensation` of the bench file; `date`: the day on which it is made."""
+    limits = plan.compensation.limits
+
+    def entry(table: CompensationTable) -> dict[str, Any]:
+        finding = ", ".join(plan.derived.sources[table.name])
+        origin = {"recording": str(source.parent.name or source.name), "finding": finding, "date": date}
+        backward = {} if np.array_equal(table.forward, table.backward) else {"backward": _rounded(table.backward)}
+        error = {"standard_error": plan.errors[table.name]} if plan.errors else {}
+        return {
+            "name": table.name, "enabled": True, "adds": table.adds.value, "over": table.over.value,
+            "at": _rounded(table.at), "forward": _rounded(table.forward), **backward, "origin": origin | error,
+        }  # fmt: skip
+
+    return {
+        "enabled": True,
+        "fade_in_s": limits.fade_in_s,
+        "torque_limit": limits.torque,
+        "torque_slope": limits.torque_slope,
+        "position_limit_m": limits.position_m,
+        "speed_limit_m_s": limits.speed_m_s,
+        "direction_m_s": limits.direction_m_s,
+        "entries": [entry(table) for table in plan.compensation.tables],
+    }
+
+
+def _rounded(values: Any) -> list[float]:
+    return [float(f"{value:.7g}") for value in values]

@@ -1,0 +1,96 @@
+"""The gain of a compensation on simulated axes whose effects are concealed: before, predicted, measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from command_line import hil as command
+from compensated_benches import bench_of_effects, diagnosed, there_and_back
+
+import hil
+from hil.bench.bench_file import Bench, load_bench
+from hil.compensating.compensate import Plan, plan_compensation, section_of
+from hil.compensating.prediction import Errors, errors_of, predict
+from hil.control.compensation_tables import OFF
+from hil.recording.recording import Recording
+from hil.report.compare_report import write_bench
+
+FADE_S = 0.3
+
+
+def measured(run: Recording, ratio: float) -> Errors:
+    added = run.columns.get("compensation_position_m", np.zeros(len(run)))
+    return errors_of(
+        run["position_command_m"],
+        added,
+        ratio * run["motor_position_rad"],
+        run["table_position_m"],
+        round(FADE_S * 1e3),
+    )
+
+
+@pytest.fixture(scope="module")
+def made() -> Plan:
+    bench = diagnosed()
+    return plan_compensation(bench, there_and_back(bench, 0.1, 0.1), None, FADE_S)
+
+
+def test_errors_fall_as_predicted_on_a_motion_that_no_table_was_made_on(
+    made: Plan, capsys: pytest.CaptureFixture[str]
+) -> None:
+    section = section_of(made, Path("bench.diagnosed.yaml"), "2026-01-31")
+    plain, compensated = bench_of_effects(), bench_of_effects(compensation=section)
+    motion = there_and_back(plain, 0.063, 0.02)
+    ratio = plain.axis.ratio_m_rad
+    before, after = (measured(hil.simulate(one, motion, seed=5), ratio) for one in (plain, compensated))
+    tables = compensated.tables()
+    told_before, told = (predict(diagnosed(), motion, one, FADE_S) for one in (OFF, tables))
+    with capsys.disabled():
+        for name, index in (("following", 0), ("positioning", 1)):
+            figures = [1e6 * one[index] for one in (before, told_before, told, after)]
+            print(
+                "\n{}: before {:.2f}, predicted {:.2f} -> {:.2f}, measured after {:.2f} µm rms".format(name, *figures)
+            )
+    for index in (0, 1):
+        assert after[index] < 0.6 * before[index]
+        assert told[index] == pytest.approx(after[index], rel=0.35)
+
+
+def test_every_effect_has_its_table(made: Plan) -> None:
+    sources = {effect for effects in made.derived.sources.values() for effect in effects}
+    assert sources == {"axis", "cogging_torque", "periodic_lead_error", "backlash", "table_side_friction"}
+    assert not made.derived.left_out
+
+
+def test_a_position_loop_on_the_table_needs_no_position_table() -> None:
+    data = diagnosed().model_dump(mode="json")
+    data["control"]["position_feedback"] = "table"
+    bench = Bench.model_validate(data)
+    found = plan_compensation(bench, there_and_back(bench, 0.05, 0.1), None, FADE_S).derived
+    assert {table.adds.value for table in found.compensation.tables} == {"torque"}
+    assert ("periodic_lead_error", "the position loop sees the table and corrects it") in found.left_out
+
+
+def test_the_command_writes_a_bench_and_refuses_to_overwrite_it(tmp_path: Path) -> None:
+    bench = diagnosed()
+    late = {"effect": "transport_delay", "parameters": {"delay_s": 0.0005}}
+    write_bench(
+        Bench.model_validate(bench.model_dump(mode="json") | {"mechanisms": [late]}), tmp_path / "bench.diagnosed.yaml"
+    )
+    profile = {"schema_version": 1, "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.5, "jerk_m_s3": 120}}
+    profile["segments"] = [  # type: ignore[assignment]
+        {"kind": "dwell", "duration_s": 0.5},
+        {"kind": "sine_squared", "to_m": 0.05, "feed_m_s": 0.1},
+        {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.1},
+    ]
+    (tmp_path / "move.yaml").write_text(yaml.safe_dump(profile), encoding="utf-8")
+    arguments = ("compensate", ".", "--profile", "move.yaml", "--fade-in", "0.3")
+    ran = command(tmp_path, *arguments)
+    assert ran.returncode == 0, ran.stderr
+    assert "Not compensated: transport_delay: a delay or limit of the torque" in ran.stdout
+    written = load_bench(tmp_path / "bench.compensated.yaml")
+    assert [entry.name for entry in written.compensation.entries] == ["inertia", "friction and load"]  # type: ignore[union-attr]
+    assert command(tmp_path, *arguments).returncode == 2

@@ -5,7 +5,7 @@ import math
 from hil.bench.bench_file import Bench
 from hil.bench.control_section import UNKNOWN, UnknownControl
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.result import Correction
+from hil.diagnosis.value import Correction
 from hil.errors import FieldPath
 from hil.files.yaml_edit import YamlChange
 from hil.identification.coordinates import DELAY, known_coordinates, known_values

@@ -93,7 +93,8 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
 def _in_bench(final: Fit) -> str:
     """Springs and mechanisms of the bench, as a draft has them, that these recordings tell; empty without."""
     hypothesis = final.hypothesis
-    errors = dict(zip(hypothesis.nominal, standard_errors(final), strict=False))
+    # a fit at the values of the bench file has no derivatives, and these values no errors
+    errors = dict(zip(hypothesis.nominal, standard_errors(final) if final.jacobian.size else (), strict=False))
     axis, told = final.bench.axis, list[str]()
     for name in axis.SPRINGS:
         if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:

@@ -43,7 +43,7 @@ def test_a_trajectory_draws_its_set_points() -> None:
 
 def test_a_recording_draws_the_channels_asked_for(tmp_path: Path) -> None:
     recording = record(tmp_path, bench_with())
-    assert labels(recording.plot("torque_n_m"))[0].startswith("torque n m\n[")
+    assert labels(recording.plot("torque_n_m"))[0].startswith("torque\n[")
     assert len(recording.plot().axes) == 6
     with pytest.raises(InputError, match="force_n is not recorded"):
         recording.plot("force_n")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.compensating.shapes import Reach, shapes, thinned
+from hil.compensating.shapes import TableReach, shapes, thinned
 from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable, Over
 from hil.motion.trajectory import Trajectory
 from hil.twin.library import BY_ID
@@ -46,18 +46,18 @@ class Derived:
     left_out: tuple[tuple[str, str], ...]
 
 
-def reach_of(bench: Bench, motion: Trajectory) -> Reach:
-    """Reach of a motion, its travel enlarged to that of the bench."""
+def reach_of(bench: Bench, motion: Trajectory) -> TableReach:
+    """TableReach of a motion, its travel enlarged to that of the bench."""
     low, high = float(motion.position_m.min()), float(motion.position_m.max())
     if bench.drive is not None and bench.drive.travel_m is not None:
         low, high = min(low, bench.drive.travel_m[0]), max(high, bench.drive.travel_m[1])
     physics, ratio = bench.axis.physics(), bench.axis.ratio_m_rad
     turn_m = 2.0 * np.pi * ratio / physics.angle_per_unit if physics.turn_known else 0.0
     speed, acceleration = (float(np.abs(one).max()) for one in (motion.velocity_m_s, motion.acceleration_m_s2))
-    return Reach(low, high, speed, acceleration, turn_m)
+    return TableReach(low, high, speed, acceleration, turn_m)
 
 
-def derive(bench: Bench, reach: Reach, fade_in_s: float) -> Derived:
+def derive(bench: Bench, reach: TableReach, fade_in_s: float) -> Derived:
     """Derive the tables of a bench for a reach. Raises FieldError without a control law."""
     gains, left_out = bench.known_control.gains(bench.axis.ratio_m_rad), list[tuple[str, str]]()
     whole = bench.twin()
@@ -114,7 +114,7 @@ def _changes(table: CompensationTable, other: CompensationTable) -> bool:
     return bool(change > MATTERS * size(table) + _least(table))
 
 
-def _goes_by_time(active: Active, reach: Reach) -> bool:
+def _goes_by_time(active: Active, reach: TableReach) -> bool:
     """True if a contribution is another one at the same place and speed later."""
     if active.form.stage not in KERNEL_STAGES:
         return False
@@ -134,7 +134,9 @@ def _reason(active: Active, from_table: bool) -> str:
     return _REASONS.get(stage, NOTHING)
 
 
-def _limits(tables: list[CompensationTable], reach: Reach, torque_limit: float, fade_in_s: float) -> CompensationLimits:
+def _limits(
+    tables: list[CompensationTable], reach: TableReach, torque_limit: float, fade_in_s: float
+) -> CompensationLimits:
     """Limits with room above the tables, and speeds with which they can be followed over the reach."""
     of_torque, of_position = ([table for table in tables if table.adds is adds] for adds in Adds)
     torque = min(ROOM * sum(map(size, of_torque)), SHARE * torque_limit)

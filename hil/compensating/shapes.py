@@ -25,7 +25,7 @@ SLOWEST = 0.005  # of the largest velocity: the first knot of the velocity, and 
 
 
 @dataclass(frozen=True)
-class Reach:
+class TableReach:
     """Motion for which tables are made; `turn_m`: way per turn of the motor, 0: not known."""
 
     low_m: float
@@ -50,7 +50,7 @@ class Reach:
         return np.asarray((turns[:, np.newaxis] + np.arange(PER_TURN) / PER_TURN) * self.turn_m, dtype=np.float64)
 
 
-def shapes(twin: Twin, reach: Reach, from_table: bool) -> dict[str, CompensationTable]:
+def shapes(twin: Twin, reach: TableReach, from_table: bool) -> dict[str, CompensationTable]:
     """Tables of a twin by name, with all knots; names and knots depend on the reach alone.
 
     `from_table`: the position loop corrects what the linear encoder shows, so that no position is corrected.
@@ -82,7 +82,7 @@ def thinned(table: CompensationTable) -> CompensationTable | None:
     return None
 
 
-def _over_acceleration(twin: Twin, reach: Reach) -> CompensationTable:
+def _over_acceleration(twin: Twin, reach: TableReach) -> CompensationTable:
     """Inertia of the axis as one body."""
     largest = reach.acceleration_m_s2
     torque = float(twin.chain.inertia_kg_m2.sum()) / twin.gains.ratio_m_rad * largest
@@ -90,7 +90,7 @@ def _over_acceleration(twin: Twin, reach: Reach) -> CompensationTable:
     return CompensationTable("inertia", Adds.TORQUE, Over.ACCELERATION, at, values, values)
 
 
-def _over_velocity(twin: Twin, reach: Reach) -> CompensationTable:
+def _over_velocity(twin: Twin, reach: TableReach) -> CompensationTable:
     """Mean over the places; friction goes over from one direction to the other within the first knots about rest."""
     speeds = reach.direction_m_s * np.geomspace(1.0, 1.0 / SLOWEST, SPEEDS)
     at = np.concatenate([-speeds[::-1], speeds])
@@ -99,7 +99,7 @@ def _over_velocity(twin: Twin, reach: Reach) -> CompensationTable:
     return CompensationTable("friction and load", Adds.TORQUE, Over.VELOCITY, at, values, values)
 
 
-def _along(what: str, adds: Adds, reach: Reach, curves: list[FloatArray]) -> list[CompensationTable]:
+def _along(what: str, adds: Adds, reach: TableReach, curves: list[FloatArray]) -> list[CompensationTable]:
     """Tables over angle and position of curves forward and backward (turns, PER_TURN)."""
     place, found = reach.places, []
     angle = [np.zeros(place.shape[1])] * 2

@@ -19,7 +19,7 @@ from hil.compiled.rounding import rounded
 from hil.control.compensation_tables import Over, Packed
 
 
-class Place(IntEnum):
+class Remembered(IntEnum):
     """Places of what a compensation remembers from tick to tick."""
 
     DIRECTION = 0  # of the last motion: 1 away from home, -1 back, 0 before the first
@@ -48,8 +48,8 @@ class AddedOverTime(NamedTuple):
     torque: FloatArray
 
 
-_DIRECTION, _REVERSED, _SINCE_S, _SINCE_M = (int(place) for place in list(Place)[:4])
-_WEIGHT, _CORRECTION, _TORQUE, _DATUM = (int(place) for place in list(Place)[4:])
+_DIRECTION, _REVERSED, _SINCE_S, _SINCE_M = (int(place) for place in list(Remembered)[:4])
+_WEIGHT, _CORRECTION, _TORQUE, _DATUM = (int(place) for place in list(Remembered)[4:])
 _OVER = list(Over)
 _VELOCITY, _ACCELERATION, _ANGLE = (_OVER.index(one) for one in (Over.VELOCITY, Over.ACCELERATION, Over.ANGLE))
 _POSITION, _REVERSAL_TIME = _OVER.index(Over.POSITION), _OVER.index(Over.REVERSAL_TIME)
@@ -58,7 +58,7 @@ _TURN = 2.0 * np.pi
 
 def start() -> FloatArray:
     """State before the first tick of a run."""
-    return np.zeros(len(Place))
+    return np.zeros(len(Remembered))
 
 
 @njit(_nrt=False, error_model="numpy")
@@ -128,7 +128,7 @@ def _turned(packed, state, velocity):  # type: ignore[no-untyped-def]
 
 @njit(_nrt=False, error_model="numpy")
 def step(packed, state, position, velocity, acceleration, wanted):  # type: ignore[no-untyped-def]
-    """Compute what this tick adds; see the module's equations. `state` (len(Place),) is changed; wanted: not stopping.
+    """Compute what this tick adds; `state` (len(Remembered),) is changed. wanted: not stopping.
 
     Where the direction of motion counts, torque goes over within `direction_m_s` about rest, and a position is held at
     rest for the direction of the last motion: a gap stays taken up.

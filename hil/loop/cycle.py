@@ -62,7 +62,7 @@ class Loop(NamedTuple):
     rows: FloatArray  # (2, columns + 1): in turn; values of absent columns go to the last place
     place: np.ndarray[Any, np.dtype[np.int64]]  # (len(Column),): place of each column in a row
     tables: Packed  # of the compensation; without any, it is off
-    added: FloatArray  # (len(compensation.Place),) its state
+    added: FloatArray  # (len(compensation.Remembered),) its state
 
 
 _read, _advance, _step, _compensate = kernel.read, kernel.advance, cascade.step, compensation.step
@@ -214,7 +214,7 @@ class Cycle:
         segments = trajectory.segment if segment is None else np.full(len(trajectory), segment)
         self.first_tick = first_tick
         if self.loop.law.gains.position_from_table and first_tick == 0:  # the zero of the motor encoder is another one
-            self.loop.added[compensation.Place.DATUM] = trajectory.position_m[0] - self._start_m
+            self.loop.added[compensation.Remembered.DATUM] = trajectory.position_m[0] - self._start_m
         self.setpoints = np.column_stack(
             (trajectory.position_m, trajectory.velocity_m_s, trajectory.acceleration_m_s2, segments)
         ).astype(np.float64, order="C", copy=False)

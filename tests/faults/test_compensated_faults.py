@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-import observed_run
+from typing import Any
+
+import matrix
 import pytest
 from matrix import one_run
+from observed_run import bench_with
 
 from hil.bench.bench_file import Bench, load_bench
-from hil.loop.simulated_bench import load_simulated
+from hil.bench.hardware import DriveMode
+from hil.control.compensation_tables import Adds
 from hil.manual.keys import EXAMPLES
 
+FADE_IN_S = 0.02  # as short as the rest before the move
 
-def _compensated(name: str) -> Bench:
-    section = load_bench(EXAMPLES / "bench-compensated.yaml").compensation
+
+def _compensated(**changes: dict[str, Any]) -> Bench:
+    """The bench of the matrix with tables; a drive that makes its torque gets those of the position only."""
+    bench, section = bench_with(**changes), load_bench(EXAMPLES / "bench-compensated.yaml").compensation
     assert section is not None
-    section = section.model_copy(update={"fade_in_s": 0.02})  # as short as the rest before the move
-    return load_simulated(name).model_copy(update={"compensation": section})
+    assert bench.drive is not None
+    torque = bench.drive.mode is DriveMode.CST
+    entries = tuple(entry for entry in section.entries if torque or entry.adds is Adds.POSITION)
+    section = section.model_copy(update={"fade_in_s": FADE_IN_S, "entries": entries})
+    return Bench.model_validate(bench.model_dump() | {"compensation": section.model_dump()})
 
 
 @pytest.mark.parametrize("seed", range(1, 25))
 def test_a_fault_stops_a_compensated_axis(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(observed_run, "load_simulated", _compensated)
+    monkeypatch.setattr(matrix, "bench_with", _compensated)
     run = one_run(seed)
     assert not run.wrong, f"{run.fault} in {run.state} ({run.about})"

@@ -11,7 +11,7 @@ from compensated_benches import there_and_back
 import hil
 from hil.bench.bench_file import Bench, load_bench
 from hil.control import cascade, compensation
-from hil.control.compensation import Place
+from hil.control.compensation import Remembered
 from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable, Over, pack
 from hil.errors import InputError
 from hil.loop.cycle import STOP_SEGMENT
@@ -108,7 +108,7 @@ def test_a_stop_takes_it_out_within_its_slope() -> None:
     tables = one_table(Adds.TORQUE, Over.VELOCITY, [-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])
     packed, state = pack(tables, 1e-3), compensation.start()
     before = compensation.step(packed, state, 0.0, 1.0, 0.0, True)
-    state[Place.TORQUE] = before.torque
+    state[Remembered.TORQUE] = before.torque
     slow = packed._replace(constants=np.array([10.0, 100.0, 1.0, 1.0, 0.0, 0.01, 2.0, 1e-3]))
     torques = [compensation.step(slow, state, 0.0, 1.0, 0.0, False).torque for _ in range(12)]
     assert before.torque == pytest.approx(1.0)

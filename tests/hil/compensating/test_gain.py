@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import yaml
 from command_line import hil as command
-from compensated_benches import bench_of_effects, diagnosed, there_and_back
+from compensated_benches import EFFECTS, bench_of_effects, diagnosed, there_and_back
 
 import hil
 from hil.bench.bench_file import Bench, load_bench
 from hil.compensating.compensate import Plan, plan_compensation, section_of
 from hil.compensating.prediction import Errors, errors_of, predict
-from hil.control.compensation_tables import OFF
+from hil.control.compensation_tables import OFF, Adds
+from hil.diagnosis.result import Correction, Finding, Result, Value
 from hil.recording.recording import Recording
 from hil.report.compare_report import write_bench
 
@@ -94,3 +95,28 @@ def test_the_command_writes_a_bench_and_refuses_to_overwrite_it(tmp_path: Path) 
     written = load_bench(tmp_path / "bench.compensated.yaml")
     assert [entry.name for entry in written.compensation.entries] == ["inertia", "friction and load"]  # type: ignore[union-attr]
     assert command(tmp_path, *arguments).returncode == 2
+
+
+def _lead_error_found(phase_error_rad: float) -> Result:
+    """What the prediction reads of a diagnosis: the standard errors of a finding and of a mass."""
+    values = EFFECTS["periodic_lead_error"]
+    errors = {"amplitude_m": 1e-7, "phase_rad": phase_error_rad}
+    parameters = {name: Value(value=value, std=errors[name], unit="") for name, value in values.items()}
+    finding = Finding(effect="periodic_lead_error", confidence=1.0, parameters=parameters, sentence="")
+    mass = Correction(value=384.0, std=2.0, unit="kg", nominal=380.0)
+    return Result.model_construct(missing=(finding,), partial=(), parameter_corrections={"table_mass_kg": mass})
+
+
+@pytest.mark.parametrize(("phase_error_rad", "harms"), [(0.02, False), (2.0, True)])
+def test_parameters_that_are_not_known_give_no_compensation(phase_error_rad: float, harms: bool) -> None:
+    bench = load_bench("reference")
+    entry = {"effect": "periodic_lead_error", "parameters": EFFECTS["periodic_lead_error"]}
+    bench = Bench.model_validate(bench.model_dump(mode="json") | {"mechanisms": [entry]})
+    made = plan_compensation(bench, there_and_back(bench, 0.03, 0.01), _lead_error_found(phase_error_rad), FADE_S)
+    low, high = made.gain.interval(Adds.POSITION)
+    assert low < 1.0
+    assert (high >= 1.0) is harms
+    assert [text for text in made.harms if "positioning" in text] != [] if harms else made.harms == []
+    # A sin(a + p): the largest standard error of a value is A times that of the phase
+    assert made.errors["set-point over angle"] == pytest.approx(8e-6 * phase_error_rad, rel=0.7)
+    assert made.errors["inertia"] > 0.0

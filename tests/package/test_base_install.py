@@ -33,6 +33,5 @@ def test_what_explains_and_diagnoses_needs_no_plots() -> None:
 def test_a_command_that_only_draws_says_what_it_needs(tmp_path: Path) -> None:
     ran = base("from hil.cli import main; main()", "paper", "--out", tmp_path / "paper")
     assert ran.returncode == 2
-    assert (
-        ran.stderr.strip() == "this command needs matplotlib, which is not installed: pip install 'hil-servo[report]'"
-    )
+    told = "this command needs matplotlib, which is not installed: pip install 'hil-servo[report]'"
+    assert ran.stderr.strip() == told

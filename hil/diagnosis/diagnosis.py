@@ -17,6 +17,7 @@ from hil.errors import InputError
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
+from hil.identification.terms import Term
 from hil.quantities import digits
 
 if TYPE_CHECKING:
@@ -81,6 +82,15 @@ class Diagnosis:
         """Hypothesis of the verdict: the terms found, or the nominal twin if there is no finding."""
         return self.reported.judged.final
 
+    def term_of(self, index: int) -> Term:
+        """The term of the final hypothesis that the finding `index` reports."""
+        finding = self.result.findings[index]
+        terms = self.final.terms
+        if finding.windows:
+            return next(term for term in terms if term.windows)
+        strength = next(iter(finding.parameters.values())).value
+        return next(term for term in terms if term.effect == finding.effect and term.values[0] == strength)
+
     def plot(
         self, what: Literal["residuals", "location", "finding", "change"] = "residuals", number: int = 1
     ) -> Drawing:
@@ -102,7 +112,7 @@ class Diagnosis:
         if what == "finding":
             if not 1 <= number <= len(self.result.findings):
                 raise InputError(f"number: given {number}, allowed 1 to {len(self.result.findings)} findings")
-            return findings.finding_figure(self, findings.term_of(self, number - 1)).figure
+            return findings.finding_figure(self, self.term_of(number - 1)).figure
         run = (*self.held_out.runs, *self.train.runs)[0]
         heading = f"{run.name}: measured - twin, noise floor in grey"
         return over_time(heading, run.time_s, location.residual_panels(self, run))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.pictures.findings import finding_figure, term_of
+from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.result import Finding
 from hil.diagnosis.statement import MENTIONED
 from hil.diagnosis.turning import of_load
@@ -26,7 +26,7 @@ def findings_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
 
 
 def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None:
-    finding, term = diagnosis.result.findings[index], term_of(diagnosis, index)
+    finding, term = diagnosis.result.findings[index], diagnosis.term_of(index)
     mechanism = BY_ID[finding.effect]
     name = label(term, diagnosis.given_bench)
     name = f"Explains a part: {name}" if diagnosis.result.partial else f"{name[:1].upper()}{name[1:]}"

@@ -5,7 +5,6 @@ from typing import NamedTuple
 from hil.bench.bench_file import MechanismEntry
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.pictures.findings import term_of
 from hil.diagnosis.result import Finding
 from hil.diagnosis.verdict.strength import strength_over_error
 from hil.diagnosis.wording import title, titles, unit_in
@@ -27,7 +26,7 @@ class FoundItem(NamedTuple):
 def found_items(diagnosis: Diagnosis) -> list[FoundItem]:
     """Items of the permanent terms, then of the maps of what has no name."""
     final, result = diagnosis.final, diagnosis.result
-    found = {id(term_of(diagnosis, at)): finding for at, finding in enumerate(result.findings)}
+    found = {id(diagnosis.term_of(at)): finding for at, finding in enumerate(result.findings)}
     permanent = [at for at, term in enumerate(final.terms) if not term.windows]
     first = len(diagnosis.bench.mechanisms) - len(permanent) - len(result.unnamed)
     entries = diagnosis.bench.mechanisms[first:]

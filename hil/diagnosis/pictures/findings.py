@@ -43,13 +43,3 @@ def finding_figure(diagnosis: Diagnosis, term: Term) -> Captioned:
         wanted = Picture.TIME
     figure, caption = PICTURES[wanted](diagnosis, views)
     return Captioned(labelled(figure, diagnosis.given_bench.axis.turns), caption)
-
-
-def term_of(diagnosis: Diagnosis, index: int) -> Term:
-    """The term of the final hypothesis that the finding `index` reports."""
-    finding = diagnosis.result.findings[index]
-    terms = diagnosis.final.terms
-    if finding.windows:
-        return next(term for term in terms if term.windows)
-    strength = next(iter(finding.parameters.values())).value
-    return next(term for term in terms if term.effect == finding.effect and term.values[0] == strength)

@@ -29,13 +29,13 @@ def statement(result: Result) -> str:
         return "The twin reproduces these recordings to within their noise."
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
-    if result.time_budget:
+    if result.time_budget and not result.partial:
         return f"The time budget ended before a mechanism was found: {_unexplained(result)}"
     if result.partial:
         share = percent(1.0 - result.unexplained.share)
         return (
-            "No mechanism of the library explains the whole mismatch. "
-            f"{_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
+            f"{'The time budget ended, and no' if result.time_budget else 'No'} mechanism of the library explains the "
+            f"whole mismatch. {_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
         )
     return f"The mismatch is not explained by any mechanism of the library: {_unexplained(result)}"
 

@@ -25,6 +25,7 @@ Twin and axis
     compare            measured against twin, in closed loop and block by block
     fit_nominal        masses, stiffness and friction, fitted to recordings
     identify_friction  friction from constant feeds, with standard errors
+    frf                frequency responses of plant and loops beside the twin, with stability margins
 Missing physics
     diagnose           which physics the twin lacks
     explain            from files to a diagnosis and its page in one step
@@ -34,7 +35,7 @@ Missing physics
 Files
     save               write any of these to a file; its ending says the form
 Objects
-    Bench, Profile, Trajectory, Recording, Twin, Mechanism, LIBRARY, Comparison, Diagnosis, Verdict
+    Bench, Profile, Trajectory, Recording, Twin, Mechanism, LIBRARY, Comparison, FrequencyResponse, Diagnosis, Verdict
 Errors
     HilError, and of its kind InputError (a file or argument) and FieldError (a value in a model)
 """

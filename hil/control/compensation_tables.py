@@ -31,7 +31,7 @@ class Over(StrEnum):
 
     VELOCITY = "velocity_m_s"
     ACCELERATION = "acceleration_m_s2"
-    ANGLE = "angle_rad"  # of the motor, 0 to 2 pi
+    ANGLE = "motor_angle_rad"  # of the motor, 0 to 2 pi
     POSITION = "position_m"
     REVERSAL_TIME = "since_reversal_s"
     REVERSAL_WAY = "since_reversal_m"

@@ -72,6 +72,7 @@ MODULES = {
     "hil/loop/certificate.py": Suite(_loop("certificate")),
     "hil/loop/checks.py": Suite(_loop("checks", "encoder_checks"), compiled=False),
     "hil/loop/clock.py": Suite(_loop("clock", "late_ticks")),
+    "hil/loop/columns.py": Suite(_loop("session", "virtual"), test_s=240),
     "hil/loop/cycle.py": Suite(_loop("session_times", "virtual", "session"), test_s=240),
     "hil/loop/devices.py": Suite(_loop("devices", "run_bus", "session_arming")),
     "hil/loop/disturbances.py": Suite(_loop("realtime", "latency")),

@@ -123,7 +123,11 @@ def test_a_stop_takes_it_out_within_its_slope() -> None:
         ("at: [-1.0, 1.0]", "at: [1.0, -1.0]", "ascend"),
         ("forward: [-1.144, 1.144]", "forward: [1.0]", "one for each knot"),
         ("torque_limit: 6.0", "torque_limit: -6.0", "torque_limit"),
-        ("entries:\n", "entries:\n  - {name: a, adds: torque, over: angle_rad, at: [7.0], forward: [1.0]}\n", "2 pi"),
+        (
+            "entries:\n",
+            "entries:\n  - {name: a, adds: torque, over: motor_angle_rad, at: [7.0], forward: [1.0]}\n",
+            "2 pi",
+        ),
     ],
 )
 def test_a_wrong_table_is_refused_with_its_place(tmp_path: Path, old: str, new: str, told: str) -> None:

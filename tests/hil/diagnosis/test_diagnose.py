@@ -50,6 +50,7 @@ def with_bursts(run: Recording) -> Recording:
     return changed(run, table_position_m=table_m)
 
 
+@pytest.mark.long
 def test_the_part_that_is_explained_is_told(tmp_path: Path) -> None:
     cogging = Term("cogging_torque", 0, (AMPLITUDE_N_M, 6.0, 0.4))
     train, held_out = (with_bursts(recorded(OWNER, cogging, seed=seed, name=f"run_{seed}")) for seed in (1, 2))
@@ -117,6 +118,7 @@ def test_motion_alone_is_refused() -> None:
         answer(alone, OWNER.model_copy(update={"control": UnknownControl(law="unknown")}))
 
 
+@pytest.mark.long
 def test_a_push_is_named_with_its_window() -> None:
     push = Term("external_force", 0, (400.0, 0.55, 0.75))
     (finding,) = answer(recorded(OWNER, push, times=4), OWNER).missing

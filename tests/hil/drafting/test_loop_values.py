@@ -116,6 +116,7 @@ OF_TABLE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("on_motor", "torque_only"),
     [(False, False), (True, False), pytest.param(False, True, marks=pytest.mark.long)],

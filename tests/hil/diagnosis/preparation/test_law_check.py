@@ -83,6 +83,7 @@ def test_a_delay_of_the_set_points_is_found_beside_wrong_gains(late_rows: int, b
     assert not again.corrections
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("old_rows", "by_loop"), [(1.0, True), (0.5, False)])
 def test_a_delay_of_the_loop_is_a_setting_and_sets_the_law_aside(old_rows: float, by_loop: bool) -> None:
     recording = run(old_rows) if by_loop else changed(run(old_rows), velocity_reference_m_s=None)

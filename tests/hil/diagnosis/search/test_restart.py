@@ -95,6 +95,7 @@ def test_beside_a_lost_preload_and_without_a_linear_encoder_it_is_not_looked_for
     assert not may_hide(evaluated(Hypothesis(owner), [replace(run, table_m=np.zeros(0))]))
 
 
+@pytest.mark.long
 def test_where_a_screen_beside_the_refit_finds_nothing_the_owners_values_are_searched(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -67,6 +67,7 @@ def test_one_fit_of_everything_names_it_too(case: PeerCase) -> None:
     assert "external_force" in [found["effect"] for found in fit_everything(case)["missing"]]
 
 
+@pytest.mark.long
 def test_one_fit_of_everything_answers_in_the_form_of_the_interface(case: PeerCase) -> None:
     """After two steps, which take it nowhere yet."""
     reply = parse_answer(fit_everything(case, evaluations=2))

@@ -22,6 +22,7 @@ def given_or_shipped(source: str | Path, kind: Shipped) -> Path:
     path, shipped = Path(source), shipped_files(kind)
     if str(source) in shipped:
         return shipped[str(source)]
-    if path.suffix not in (".yaml", ".yml") and not is_file(path):
+    longest = 255  # bytes of a name (Linux, NAME_MAX): the reader of a longer one tells that
+    if path.suffix not in (".yaml", ".yml") and len(path.name.encode()) <= longest and not is_file(path):
         raise InputError(f"{source}: no such {kind}; give a .yaml file or one of {', '.join(shipped)}")
     return path

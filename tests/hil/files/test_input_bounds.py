@@ -164,18 +164,13 @@ def test_a_file_without_bounds_is_refused(tmp_path: Path, case: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["import", "{}.csv"], "File name too long"),
-        (["validate", "{}.yaml"], "File name too long"),
-        (["import", "a.csv", "--map", "{}"], "no such map"),
-    ],
+    "arguments", [["import", "{}.csv"], ["validate", "{}.yaml"], ["import", "a.csv", "--map", "{}"]]
 )
-def test_a_name_of_300_characters_is_refused(tmp_path: Path, arguments: list[str], says: str) -> None:
+def test_a_name_of_300_characters_is_refused(tmp_path: Path, arguments: list[str]) -> None:
     (tmp_path / "a.csv").write_text("t,x,f\n" + "\n".join(f"{k},{k},{k}" for k in range(9)))
     ran = hil(tmp_path, *(one.format("x" * 300) for one in arguments))
     assert ran.returncode == 2
-    assert says in ran.stderr
+    assert "File name too long" in ran.stderr
 
 
 def test_a_result_with_a_name_of_300_characters_is_refused(tmp_path: Path) -> None:

@@ -36,10 +36,8 @@ def test_the_demo_finds_what_it_conceals(tmp_path: Path) -> None:
     assert "effects" not in diagnosed.partition("simulation:")[0]  # the truth is that of the machine alone
 
 
-@pytest.mark.parametrize(
-    "effect",
-    [pytest.param(effect, marks=() if effect == "periodic_lead_error" else pytest.mark.long) for effect in CONCEALED],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("effect", CONCEALED)
 def test_the_demo_finds_each_of_its_effects(tmp_path: Path, effect: str) -> None:
     ran = hil(tmp_path, "demo", "--virtual", "--effect", effect, "--seed", "5", "--out", "demo")
     assert ran.returncode == 0, ran.stderr

@@ -48,6 +48,7 @@ def write_inputs(folder: Path) -> tuple[Path, Path]:
     return profile, bench
 
 
+@pytest.mark.long
 def test_what_one_direction_hides_is_found_by_the_motion_that_it_designs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

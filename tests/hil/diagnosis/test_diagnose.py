@@ -68,6 +68,7 @@ def test_the_part_that_is_explained_is_told(tmp_path: Path) -> None:
     assert [entry.effect for entry in load_bench(tmp_path / "bench.diagnosed.yaml").mechanisms] == ["cogging_torque"]
 
 
+@pytest.mark.long
 def test_wrong_gains_are_settings_of_the_controller_and_no_physics() -> None:
     result = answer(laps(), believed(**WRONG))
     assert result.verdict == "parameter_error"
@@ -86,6 +87,7 @@ def test_a_cause_is_named_beside_wrong_gains() -> None:
     assert VELOCITY_GAIN in result.parameter_corrections
 
 
+@pytest.mark.long
 def test_positions_coarser_than_those_of_the_loop_are_no_mismatch() -> None:
     recording = laps()
     step_rad = 100.0 * OWNER.motor_count

@@ -85,6 +85,7 @@ def printed(folder, script):
     return done.stdout.splitlines()[-1]
 
 
+@pytest.mark.long
 def test_it_acts_on_the_axis(tmp_path) -> None:
     """At 50 mm the load is 0.4 N: an equal force holds 1 kg there, and without one it falls by a t^2 / 2 in 10 ms."""
     ripple, fallen = map(float, printed(tmp_path, MOTION).split())

@@ -69,7 +69,7 @@ def test_another_speed_is_no_speed_set_point() -> None:
     assert_gains(checked(changed(recording, velocity_reference_m_s=other), believed(**WRONG)))
 
 
-@pytest.mark.parametrize(("late_rows", "by_loop"), [(7, True), (-12, False)])
+@pytest.mark.parametrize(("late_rows", "by_loop"), [(7, True), pytest.param(-12, False, marks=pytest.mark.long)])
 def test_a_delay_of_the_set_points_is_found_beside_wrong_gains(late_rows: int, by_loop: bool) -> None:
     recording = run(late_rows=late_rows) if by_loop else changed(run(late_rows=late_rows), velocity_reference_m_s=None)
     law = checked(recording, believed(**WRONG))

@@ -68,6 +68,7 @@ def test_it_is_fitted_although_the_refit_leaves_next_to_nothing() -> None:
     assert bench.axis.table_mass_kg == pytest.approx(truth.axis.table_mass_kg, rel=0.02)
 
 
+@pytest.mark.long
 def test_it_is_named_where_what_is_left_matters() -> None:
     owner, truth = stiff_owner()
     for terms in ((LOST,), ()):

@@ -226,6 +226,7 @@ def test_a_pair_and_a_rival(cases: dict[str, DrawnCase]) -> None:
     assert truth.rivals[0] not in truth.effects[0].same_law
 
 
+@pytest.mark.long
 def test_what_no_motion_tells_apart_is_not_paired() -> None:
     assert (
         inseparable("constant_load")

@@ -45,6 +45,9 @@ def test_profiles_are_all_there() -> None:
             "multisine",
             "jog",
             "identification",
+            "positioning_iso_230_2",
+            "circle_x",
+            "circle_y",
         )
     }
 

@@ -103,7 +103,7 @@ class PositioningAccuracy:
     def repeatability_at_m(self) -> FloatArray:
         """Bidirectional repeatability R_i (m,) at each target."""
         both = 2.0 * self.estimator_m.sum(axis=0) + np.abs(self.reversal_at_m)
-        return np.maximum(both, 4.0 * self.estimator_m.max(axis=0))
+        return np.asarray(np.maximum(both, 4.0 * self.estimator_m.max(axis=0)))
 
     @cached_property
     def figures(self) -> Mapping[str, float]:

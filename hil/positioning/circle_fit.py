@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from hil.arrays import FloatArray
 
 
-class Ring(NamedTuple):
+class NarrowestRing(NamedTuple):
     """The narrowest ring around points: centre, inner radius and width, all [m]."""
 
     x_m: float
@@ -21,7 +21,7 @@ class Ring(NamedTuple):
     width_m: float
 
 
-class Circle(NamedTuple):
+class FittedCircle(NamedTuple):
     """Circle of least squares [m]."""
 
     x_m: float
@@ -29,7 +29,7 @@ class Circle(NamedTuple):
     radius_m: float
 
 
-def least_squares_circle(x_m: FloatArray, y_m: FloatArray) -> Circle:
+def least_squares_circle(x_m: FloatArray, y_m: FloatArray) -> FittedCircle:
     """Fit a circle to points (n,): least squares of their distances from it, by two steps of Gauss and Newton."""
     centre = np.array([x_m.mean(), y_m.mean()])
     radius = 0.0
@@ -39,10 +39,10 @@ def least_squares_circle(x_m: FloatArray, y_m: FloatArray) -> Circle:
         rows = np.column_stack([dx / distance, dy / distance, np.ones_like(distance)])
         (shift_x, shift_y, radius), *_ = np.linalg.lstsq(rows, distance)
         centre += (shift_x, shift_y)
-    return Circle(float(centre[0]), float(centre[1]), float(radius))
+    return FittedCircle(float(centre[0]), float(centre[1]), float(radius))
 
 
-def narrowest_ring(x_m: FloatArray, y_m: FloatArray) -> Ring:
+def narrowest_ring(x_m: FloatArray, y_m: FloatArray) -> NarrowestRing:
     """Find the two concentric circles of least distance that enclose points (n,): a linear programme."""
     first = least_squares_circle(x_m, y_m)
     dx, dy = x_m - first.x_m, y_m - first.y_m
@@ -59,4 +59,4 @@ def narrowest_ring(x_m: FloatArray, y_m: FloatArray) -> Ring:
         method="highs",
     )
     a, b, inner, width = (scale * float(value) for value in found.x)
-    return Ring(first.x_m + a, first.y_m + b, first.radius_m + inner, width)
+    return NarrowestRing(first.x_m + a, first.y_m + b, first.radius_m + inner, width)

@@ -35,7 +35,14 @@ def iso230(
     from hil.files.output import default_folder, new_folder
     from hil.positioning.accuracy import positioning_accuracy
     from hil.positioning.circle import circular_accuracy
-    from hil.report.iso230_report import accuracy_headers, accuracy_rows, circle_rows, write_accuracy, write_circle
+    from hil.report.iso230_report import (
+        CIRCLE_HEADERS,
+        accuracy_headers,
+        accuracy_rows,
+        circle_rows,
+        write_accuracy,
+        write_circle,
+    )
 
     if bool(runs) == bool(circle):
         raise InputError(
@@ -48,7 +55,7 @@ def iso230(
         with new_folder(folder) as part, progress() as tell:
             tell("writing the report")
             write_circle(result, part)
-        table(("ISO 230-4:2005", ""), circle_rows(result), right=False)
+        table(CIRCLE_HEADERS, circle_rows(result), right=False)
         verdict = result.verdict
     else:
         results = [positioning_accuracy(path if _readings(path) else read_run(path)) for path in runs or ()]

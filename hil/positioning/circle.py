@@ -91,7 +91,8 @@ class CircularAccuracy:
         )
 
     def __str__(self) -> str:
-        rows = [f"  {title_of(name):58} {quantity(value, 'm'):>12}" for name, value in self.figures.items()]
+        titled = [(*title_of(name), quantity(value, "m")) for name, value in self.figures.items()]
+        rows = [f"  {symbol:4} {meaning:40} {value:>12}" for symbol, meaning, value in titled]
         return "\n".join([f"Circle of {self.x_name} and {self.y_name} (ISO 230-4): {self.verdict}", *rows])
 
     __repr__ = __str__
@@ -116,17 +117,16 @@ def circular_accuracy(x: Recording, y: Recording) -> CircularAccuracy:
     return CircularAccuracy(x.name, y.name, circular_paths(x, y))
 
 
-def title_of(name: str) -> str:
+def title_of(name: str) -> tuple[str, str]:
     """Symbol and meaning of a figure by its name."""
     what, _, rest = name.removesuffix("_m").partition("_")
     if name == "mean_radial_m":
-        return "D    mean bidirectional radial deviation"
+        return "D", "mean bidirectional radial deviation"
     if what == "circular":
-        return (
-            "G(b) bidirectional circular deviation" if rest == "bidirectional" else f"G    circular deviation, {rest}"
-        )
+        both = rest == "bidirectional"
+        return ("G(b)", "bidirectional circular deviation") if both else ("G", f"circular deviation, {rest}")
     which, _, sense = rest.partition("_")
-    return f"F    {which} radial deviation, {sense}"
+    return "F", f"{which} radial deviation, {sense}"
 
 
 def radial_deviation(path: CircularPath) -> FloatArray:

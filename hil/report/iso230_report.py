@@ -8,12 +8,13 @@ from hil.figures.drawing import save
 from hil.files.output import write_json
 from hil.positioning.accuracy import FIGURES, PositioningAccuracy
 from hil.positioning.accuracy_picture import deviations_over_position
-from hil.positioning.circle import QUADRANTS_DEG, CircularAccuracy, title_of
+from hil.positioning.circle import CircularAccuracy, title_of
 from hil.positioning.circle_picture import draw_circle
 from hil.quantities import digits, quantity, reading_unit
 from hil.report.page import Page
 
 SCHEMA_VERSION = 1
+CIRCLE_HEADERS = ("", "ISO 230-4:2005", "")
 _UNCERTAINTY = "The uncertainty of the measurement (ISO/TR 230-9) is neither taken off the figures nor added to them."
 
 
@@ -31,11 +32,11 @@ def accuracy_headers(results: Sequence[PositioningAccuracy]) -> list[str]:
 
 
 def circle_rows(result: CircularAccuracy) -> list[list[str]]:
-    """Rows of the table: symbol and meaning, value; then the quadrant spikes."""
-    rows = [[title_of(name), quantity(value, "m")] for name, value in result.figures.items()]
+    """Rows of the table: symbol, meaning, value; then the quadrant spikes."""
+    rows = [[*title_of(name), quantity(value, "m")] for name, value in result.figures.items()]
     for sense, path in result.paths.items():
-        told = ", ".join(f"{at}°: {quantity(result.spikes_m[sense][at], 'm')}" for at in QUADRANTS_DEG)
-        rows.append([f"     quadrant spikes, {path.name}", told])
+        for at, spike in result.spikes_m[sense].items():
+            rows.append(["", f"quadrant spike at {at}°, {path.name}", quantity(spike, "m")])
     return rows
 
 
@@ -70,7 +71,7 @@ def write_circle(result: CircularAccuracy, folder: Path) -> None:
         result.verdict,
         True,
     )
-    page.table(("ISO 230-4:2005", ""), circle_rows(result))
+    page.table(CIRCLE_HEADERS, circle_rows(result), left=(0, 1))
     page.picture(
         save(draw_circle(result), folder / "circle.png"),
         "Paths with their radial deviation enlarged; radial deviation over the angle, 0° at the positive end of "

@@ -15,6 +15,7 @@ from compensated_benches import there_and_back
 
 import hil
 from hil.bench.bench_file import Bench, load_bench
+from hil.compensating.compensate import plan_compensation
 from hil.compensating.controllers.cia402 import for_cia402
 from hil.compensating.controllers.controller_task import ControllerTask
 from hil.compensating.controllers.linuxcnc import for_linuxcnc
@@ -218,6 +219,30 @@ def test_the_stream_of_cia_402_is_what_the_loop_adds() -> None:
         for_cia402(replace(task, rated_torque=None))
     with pytest.raises(HilError, match="allowed up to"):
         for_cia402(replace(task, rated_torque=1e-4))
+
+
+def test_the_table_of_linuxcnc_moves_a_simulated_axis_to_its_targets() -> None:
+    """The other equations of the simulated axis, with the file applied to its set-points as LinuxCNC does."""
+    bench = load_bench("reference").model_dump(mode="json")
+    lead = {"effect": "periodic_lead_error", "parameters": {"amplitude_m": AMPLITUDE_M, "phase_rad": PHASE}}
+    plain = Bench.model_validate(bench | {"simulation": {"effects": [lead]}})
+    diagnosed = Bench.model_validate(bench | {"mechanisms": [lead]})
+    motion = there_and_back(plain, 0.027, 0.01)
+    made = plan_compensation(diagnosed, motion, None, 0.2).compensation
+    task = ControllerTask("x", made, plain.gains, motion, 0.0, 0.03)
+    nominal, forward, _ = np.loadtxt(io.StringIO(for_linuxcnc(task).texts["linuxcnc.comp"]), unpack=True)
+    moved = motion.position_m + 1e-3 * np.interp(1e3 * motion.position_m, nominal, forward)
+    corrected = replace(motion, position_m=moved)
+    sliding = np.abs(motion.velocity_m_s) > 0.0099  # beside the reversals, at which friction moves the table
+    turn = 2.0 * np.pi * motion.position_m / LEAD_M
+    shapes = np.column_stack([np.sin(turn), np.cos(turn), np.ones_like(turn), np.sign(motion.velocity_m_s)])[sliding]
+    left = []
+    for one in (motion, corrected):
+        error = hil.simulate(plain, one, seed=6)["table_position_m"] - motion.position_m
+        (sin, cos, *_), *_ = np.linalg.lstsq(shapes, error[sliding])
+        left.append(np.hypot(sin, cos))
+    assert left[0] == pytest.approx(AMPLITUDE_M, rel=0.1)
+    assert left[1] < 0.2 * left[0]
 
 
 def test_the_plain_file_has_every_knot_with_its_unit() -> None:

@@ -134,7 +134,7 @@ def test_two_benches_along_one_circle(tmp_path: Path) -> None:
         hil.save(run, tmp_path / f"{name}.parquet")
     ran = command(tmp_path, "iso230", "--circle", "circle_x.parquet", "circle_y.parquet", "--out", "judged")
     assert ran.returncode == 0, ran.stderr
-    assert "G(b) bidirectional circular deviation" in ran.stdout
+    assert "G(b)  bidirectional circular deviation" in ran.stdout
     numbers = json.loads((tmp_path / "judged" / "iso230.json").read_text())
     assert numbers["radius_m"] == pytest.approx(0.05, rel=1e-6)
     assert numbers["feed_m_s"] == pytest.approx(2.0 * np.pi * 0.05 / 4.0, rel=1e-3)

@@ -32,6 +32,7 @@ def iso230(
 ) -> None:
     """Judge positions by ISO 230-2 (accuracy, repeatability, reversal) or a circle of two axes by ISO 230-4."""
     from hil.errors import InputError
+    from hil.files.optional_library import page_line
     from hil.files.output import default_folder, new_folder
     from hil.positioning.accuracy import positioning_accuracy
     from hil.positioning.circle import circular_accuracy
@@ -68,7 +69,7 @@ def iso230(
             for note in one.notes:
                 err.print(f"note: {one.name}: {note}", markup=False)
         verdict = "\n".join(f"{one.name}: {one.verdict}" for one in results)
-    out.print(f"\n{verdict}\n\nReport: {folder / 'iso230.html'}")
+    out.print(f"\n{verdict}\n\n{page_line(folder / 'iso230.html')}")
     if show:
         typer.launch(str(folder / "iso230.html"))
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from hil.figures.drawing import save
+from hil.files.optional_library import missing_of
 from hil.files.output import write_json
 from hil.positioning.accuracy import FIGURES, PositioningAccuracy
 from hil.positioning.accuracy_picture import deviations_over_position
@@ -41,7 +41,32 @@ def circle_rows(result: CircularAccuracy) -> list[list[str]]:
 
 
 def write_accuracy(results: Sequence[PositioningAccuracy], folder: Path) -> None:
-    """Write iso230.html, its PNG and iso230.json of one run, or of several side by side."""
+    """Write iso230.json of one run or several, and with the libraries of the extra `report` the page and its PNG."""
+    runs = [accuracy_json(one) for one in results]
+    write_json(folder / "iso230.json", {"schema_version": SCHEMA_VERSION, "runs": runs})
+    if not missing_of("report"):
+        _accuracy_page(results, folder)
+
+
+def write_circle(result: CircularAccuracy, folder: Path) -> None:
+    """Write iso230.json of a circular test, and with the libraries of the extra `report` the page and its PNG."""
+    numbers = {
+        "schema_version": SCHEMA_VERSION,
+        "x": result.x_name,
+        "y": result.y_name,
+        "radius_m": result.radius_m,
+        "feed_m_s": result.feed_m_s,
+        "figures": dict(result.figures),
+        "spikes_m": {path.name: dict(result.spikes_m[sense]) for sense, path in result.paths.items()},
+    }
+    write_json(folder / "iso230.json", numbers)
+    if not missing_of("report"):
+        _circle_page(result, folder)
+
+
+def _accuracy_page(results: Sequence[PositioningAccuracy], folder: Path) -> None:
+    from hil.figures.drawing import save
+
     names = ", ".join(one.name for one in results)
     verdict = " ".join(f"{one.name}: {one.verdict}" if len(results) > 1 else one.verdict for one in results)
     page = Page(f"Positioning of {names}", "accuracy and repeatability by ISO 230-2:2014", verdict, True)
@@ -57,14 +82,12 @@ def write_accuracy(results: Sequence[PositioningAccuracy], folder: Path) -> None
         page.heading(f"Targets of {one.name}")
         page.table(*_targets(one), left=())
     page.text(_UNCERTAINTY)
-    write_json(
-        folder / "iso230.json", {"schema_version": SCHEMA_VERSION, "runs": [accuracy_json(one) for one in results]}
-    )
     page.write(folder / "iso230.html")
 
 
-def write_circle(result: CircularAccuracy, folder: Path) -> None:
-    """Write iso230.html, its PNG and iso230.json of a circular test."""
+def _circle_page(result: CircularAccuracy, folder: Path) -> None:
+    from hil.figures.drawing import save
+
     page = Page(
         f"Circle of {result.x_name} and {result.y_name}",
         f"circular test by ISO 230-4, radius {quantity(result.radius_m, 'm')}, feed {quantity(result.feed_m_s, 'm/s')}",
@@ -78,18 +101,6 @@ def write_circle(result: CircularAccuracy, folder: Path) -> None:
         f"{result.x_name}. About the least-squares centre of each path.",
     )
     page.text(f"Quadrant spikes are no figure of the standard. {_UNCERTAINTY}")
-    write_json(
-        folder / "iso230.json",
-        {
-            "schema_version": SCHEMA_VERSION,
-            "x": result.x_name,
-            "y": result.y_name,
-            "radius_m": result.radius_m,
-            "feed_m_s": result.feed_m_s,
-            "figures": dict(result.figures),
-            "spikes_m": {path.name: dict(result.spikes_m[sense]) for sense, path in result.paths.items()},
-        },
-    )
     page.write(folder / "iso230.html")
 
 

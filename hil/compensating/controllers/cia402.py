@@ -22,7 +22,9 @@ LARGEST = 32767  # INTEGER16
 
 
 def for_cia402(task: ControllerTask) -> ControllerFiles:
-    """Write the stream. Raises HilError without a rated torque, or for an offset beyond INTEGER16."""
+    """Write the stream. Raises HilError without a rated torque, or for an offset beyond INTEGER16, or a voltage."""
+    if task.torque_unit == "V":
+        raise HilError("cia402: given a motor that is driven by its voltage, allowed one by its torque: use --for csv")
     if task.rated_torque is None:
         raise HilError(
             "cia402: given a bench without drive.rated_torque_n_m, allowed one with it: 0x60B2 is in 1/1000 of it; "
@@ -37,7 +39,7 @@ def for_cia402(task: ControllerTask) -> ControllerFiles:
             f"cia402: given a torque up to {np.abs(added.torque).max():.4g}, allowed up to "
             f"{LARGEST / PER_MILLE * task.rated_torque:.4g}; correct drive.rated_torque_n_m"
         )
-    torque = "force_offset_n" if task.linear else "torque_offset_n_m"
+    torque = "force_offset_n" if task.torque_unit == "N" else "torque_offset_n_m"
     length = "rad" if task.turns else "m"
     columns = (motion.time_s, motion.position_m, added.torque, offset, added.position_m)
     lines = [f"time_s,position_{length},{torque},object_60B2_per_mille,position_correction_{length}"]

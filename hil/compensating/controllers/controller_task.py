@@ -19,7 +19,7 @@ class NotTaken(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ControllerTask:
-    """A compensation with what it was made for; `low_m`, `high_m`: travel [m, rad]; torque in N m, N on a linear axis.
+    """A compensation with what it was made for; `low_m`, `high_m`: travel [m, rad]; `torque_unit`: N m, N, or V.
 
     `rated_torque`: object 0x6076 of the drive, None if the bench does not know it.
     """
@@ -31,7 +31,7 @@ class ControllerTask:
     low_m: float
     high_m: float
     turns: bool = False
-    linear: bool = False
+    torque_unit: str = "N m"
     rated_torque: float | None = None
 
     @property

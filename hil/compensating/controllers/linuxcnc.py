@@ -12,7 +12,7 @@ Source: LinuxCNC 2.9, src/emc/motion/control.c (compute_screw_comp), usrmotintf.
 """
 
 from hil.compensating.controllers.controller_task import ControllerFiles, ControllerTask, NotTaken
-from hil.compensating.controllers.position_table import position_table, rows
+from hil.compensating.controllers.position_table import position_table
 from hil.control.compensation_tables import Adds
 
 MOST = 256  # EMCMOT_COMP_SIZE
@@ -42,6 +42,9 @@ def for_linuxcnc(task: ControllerTask) -> ControllerFiles:
         "COMP_FILE_TYPE = 1",
         "# BACKLASH is within COMP_FILE and not used beside it.",
     ]
-    at, forward, backward = (task.per_unit * one for one in (table.at, table.forward, table.backward))
-    lines = rows(at, lambda number, place: f"{place:.7f} {forward[number]:.7f} {backward[number]:.7f}")
+    columns = (table.at, table.forward, table.backward)
+    lines = [
+        f"{at:.7f} {forward:.7f} {backward:.7f}"
+        for at, forward, backward in zip(*(task.per_unit * one for one in columns), strict=True)
+    ]
     return ControllerFiles({"linuxcnc.comp": "\n".join(lines) + "\n", "linuxcnc.ini": "\n".join(ini) + "\n"}, not_taken)

@@ -11,7 +11,7 @@ from hil.control.compensation_tables import Adds, Over
 def for_csv(task: ControllerTask) -> ControllerFiles:
     """Write the knots of all tables."""
     length = "rad" if task.turns else "m"
-    units = {Adds.TORQUE: "N" if task.linear else "N m", Adds.POSITION: length}
+    units = {Adds.TORQUE: task.torque_unit, Adds.POSITION: length}
     over = {
         Over.VELOCITY: f"{length}/s",
         Over.ACCELERATION: f"{length}/s^2",

@@ -1,7 +1,6 @@
 """Tables over angle and position as one table of equidistant points over the travel, as CNC controllers take it."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -77,11 +76,6 @@ def position_table(task: ControllerTask, most: int) -> OneTable:
         f"changes too fast along the travel for its {most} points; give a --profile and drive.travel_m that are short"
     )
     return OneTable(None, (*left_out, *(NotTaken(table.name, reason) for table in taken)))
-
-
-def rows(values: FloatArray, text: Callable[[int, float], str]) -> list[str]:
-    """A line for each value (n,), from its number and itself."""
-    return [text(number, value) for number, value in enumerate(values.tolist())]
 
 
 def _sums(task: ControllerTask, tables: list[CompensationTable], at: FloatArray) -> tuple[FloatArray, FloatArray]:

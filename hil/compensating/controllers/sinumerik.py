@@ -17,7 +17,7 @@ backlash, 4.4.2 measuring system error compensation with its example, 4.6 fricti
 import numpy as np
 
 from hil.compensating.controllers.controller_task import ControllerFiles, ControllerTask, NotTaken
-from hil.compensating.controllers.position_table import PositionTable, position_table, rows
+from hil.compensating.controllers.position_table import PositionTable, position_table
 from hil.control.compensation_tables import Adds, CompensationTable, Over
 
 MOST = 1000  # MD38000 sets the number; 8 bytes of NC memory each
@@ -56,7 +56,7 @@ def for_sinumerik(task: ControllerTask) -> ControllerFiles:
 
 def _encoder(task: ControllerTask, table: PositionTable) -> list[str]:
     unit, step = task.per_unit, task.per_unit * (table.at[1] - table.at[0])
-    values = rows(-unit * table.both, lambda number, value: f"$AA_ENC_COMP[0,{number},{AXIS}]={value:.7f}")
+    values = [f"$AA_ENC_COMP[0,{number},{AXIS}]={value:.7f}" for number, value in enumerate(-unit * table.both)]
     return [
         f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS must be {table.at.size} or more: set it first, it clears NC memory.",
         f"; The lines between the points leave {100.0 * table.left:.2g} % of the correction. Unit: {task.unit}.",
@@ -89,8 +89,9 @@ def _friction(task: ControllerTask, table: CompensationTable) -> list[str]:
     per_minute = task.per_unit / 360.0 * 60.0 if task.turns else 60.0 * task.per_unit  # rev/min, mm/min
     time_s = gains.velocity_gain_n_m_s_rad / gains.integral_gain_n_m_rad
     return [
-        f"; Friction at a reversal: starting values for {coulomb:.4g} {'N' if task.linear else 'N m'} of Coulomb",
+        f"; Friction at a reversal: starting values for {coulomb:.4g} {task.torque_unit} of Coulomb",
         "; friction and the velocity loop of the bench; find the best ones by a circularity test.",
+        "; MD32490, 32500, 32510, 32520, 32540; the first acts after a reset of the NCK.",
         f"$MA_FRICT_COMP_MODE[0,{AXIS}]=1",
         f"$MA_FRICT_COMP_ENABLE[{AXIS}]=1",
         f"$MA_FRICT_COMP_ADAPT_ENABLE[0,{AXIS}]=0",

@@ -18,7 +18,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.compensating.controllers.controller_task import ControllerFiles, ControllerTask, NotTaken
-from hil.compensating.controllers.position_table import PositionTable, position_table, rows
+from hil.compensating.controllers.position_table import PositionTable, position_table
 from hil.control.compensation_tables import Adds
 
 MOST = 1000  # below the 1500 of kw.ssfk.max_points
@@ -37,8 +37,8 @@ def for_twincat(task: ControllerTask) -> ControllerFiles:
 
 
 def _csv(task: ControllerTask, at: FloatArray, correction: FloatArray) -> str:
-    values = -task.per_unit * correction
-    lines = rows(task.per_unit * at, lambda number, place: f"{place:.7f};{values[number]:.7f}")
+    columns = (task.per_unit * at, -task.per_unit * correction)
+    lines = [f"{place:.7f};{value:.7f}" for place, value in zip(*columns, strict=True)]
     return "\n".join(["Position;Compensation", *lines]) + "\n"
 
 
@@ -55,5 +55,5 @@ def _list(task: ControllerTask, table: PositionTable) -> str:
     ]
     columns = {"setpoint": unit * table.at, "pos": -unit * table.forward, "neg": -unit * table.backward}
     for name, values in columns.items():
-        lines += rows(np.rint(values), lambda number, value, name=name: f"kw.ssfk.table[{number}].{name} {value:.0f}")  # type: ignore[misc]
+        lines += [f"kw.ssfk.table[{number}].{name} {value:.0f}" for number, value in enumerate(np.rint(values))]
     return "\n".join(lines) + "\n"

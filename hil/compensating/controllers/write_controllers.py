@@ -40,7 +40,7 @@ def controller_files(
         reach.low_m,
         reach.high_m,
         bench.axis.turns,
-        bench.axis.linear,
+        bench.axis.drive_unit,
         drive.rated_torque_n_m if drive is not None else None,
     )
     return {controller: WRITERS[controller](task) for controller in dict.fromkeys(controllers)}

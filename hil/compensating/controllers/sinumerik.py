@@ -56,7 +56,7 @@ def for_sinumerik(task: ControllerTask) -> ControllerFiles:
 
 def _encoder(task: ControllerTask, table: PositionTable) -> list[str]:
     unit, step = task.per_unit, task.per_unit * (table.at[1] - table.at[0])
-    values = [f"$AA_ENC_COMP[0,{number},{AXIS}]={value:.7f}" for number, value in enumerate(-unit * table.both)]
+    values = [f"$AA_ENC_COMP[0,{number},{AXIS}]={value:.7f}" for number, value in enumerate(0.0 - unit * table.both)]
     return [
         f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS must be {table.at.size} or more: set it first, it clears NC memory.",
         f"; The lines between the points leave {100.0 * table.left:.2g} % of the correction. Unit: {task.unit}.",

@@ -37,13 +37,13 @@ def for_twincat(task: ControllerTask) -> ControllerFiles:
 
 
 def _csv(task: ControllerTask, at: FloatArray, correction: FloatArray) -> str:
-    columns = (task.per_unit * at, -task.per_unit * correction)
+    columns = (task.per_unit * at, 0.0 - task.per_unit * correction)
     lines = [f"{place:.7f};{value:.7f}" for place, value in zip(*columns, strict=True)]
     return "\n".join(["Position;Compensation", *lines]) + "\n"
 
 
 def _list(task: ControllerTask, table: PositionTable) -> str:
-    """The points are whole units of the list, so that equal steps stay equal."""
+    """Points are listed one by one (interval 0), in whole units of the list."""
     unit = 1e4 * task.per_unit
     lines = [
         "kopf.log_achs_nr 1",
@@ -55,5 +55,5 @@ def _list(task: ControllerTask, table: PositionTable) -> str:
     ]
     columns = {"setpoint": unit * table.at, "pos": -unit * table.forward, "neg": -unit * table.backward}
     for name, values in columns.items():
-        lines += [f"kw.ssfk.table[{number}].{name} {value:.0f}" for number, value in enumerate(np.rint(values))]
+        lines += [f"kw.ssfk.table[{number}].{name} {value:.0f}" for number, value in enumerate(np.rint(values) + 0.0)]
     return "\n".join(lines) + "\n"

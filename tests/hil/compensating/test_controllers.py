@@ -195,6 +195,15 @@ def test_twincat_reads_its_tables_and_the_error_is_gone() -> None:
     assert set(for_twincat(task_of(LEAD_TABLE)).texts) == {"twincat-both.csv", "twincat-cnc.lis"}
 
 
+def test_a_load_that_turns_is_in_degrees() -> None:
+    sag = table(Adds.POSITION, Over.POSITION, np.array([0.0, np.pi]), np.array([0.0, 1e-3]), np.array([0.0, 2e-3]))
+    task = task_of(sag, low_m=0.0, high_m=np.pi, turns=True)
+    last = [float(one) for one in for_linuxcnc(task).texts["linuxcnc.comp"].splitlines()[-1].split()]
+    assert last == pytest.approx([180.0, np.degrees(1e-3), np.degrees(2e-3)], rel=1e-5)
+    assert "$AA_ENC_COMP_MAX[0,AX1]=180.0000" in for_sinumerik(task).texts["sinumerik.ini"]
+    assert ",rad,position,rad," in for_csv(task).texts["csv"]
+
+
 def test_a_table_that_is_too_fine_is_not_written() -> None:
     task = replace(task_of(LEAD_TABLE), high_m=LOW_M + 5.0)  # 500 turns on 256 points
     files = for_linuxcnc(task)

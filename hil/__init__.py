@@ -26,6 +26,7 @@ Twin and axis
     fit_nominal        masses, stiffness and friction, fitted to recordings
     identify_friction  friction from constant feeds, with standard errors
     frf                frequency responses of plant and loops beside the twin, with stability margins
+    positioning_accuracy, circular_accuracy   figures of ISO 230-2 and of ISO 230-4
 Missing physics
     diagnose           which physics the twin lacks
     explain            from files to a diagnosis and its page in one step
@@ -35,7 +36,8 @@ Missing physics
 Files
     save               write any of these to a file; its ending says the form
 Objects
-    Bench, Profile, Trajectory, Recording, Twin, Mechanism, LIBRARY, Comparison, FrequencyResponse, Diagnosis, Verdict
+    Bench, Profile, Trajectory, Recording, Twin, Mechanism, LIBRARY, Comparison, FrequencyResponse,
+    PositioningAccuracy, CircularAccuracy, Diagnosis, Verdict
 Errors
     HilError, and of its kind InputError (a file or argument) and FieldError (a value in a model)
 """
@@ -73,6 +75,8 @@ if TYPE_CHECKING:
     from hil.importing.draft_map import draft_map
     from hil.motion.profile import Profile, load_profile
     from hil.motion.trajectory import Trajectory, plan
+    from hil.positioning.accuracy import PositioningAccuracy, positioning_accuracy
+    from hil.positioning.circle import CircularAccuracy, circular_accuracy
     from hil.recording.recording import Recording, read_recording
     from hil.report.saving import save
     from hil.twin.axis import Twin
@@ -99,6 +103,8 @@ _MODULE_OF = {
     "fit_nominal": "hil.api",
     "identify_friction": "hil.identification.friction",
     "frf": "hil.frequency.measure",
+    "positioning_accuracy": "hil.positioning.accuracy",
+    "circular_accuracy": "hil.positioning.circle",
     "diagnose": "hil.api",
     "explain": "hil.explanation",
     "design_experiment": "hil.api",
@@ -115,6 +121,8 @@ _MODULE_OF = {
     "LIBRARY": "hil.twin.library",
     "Comparison": "hil.identification.compare",
     "FrequencyResponse": "hil.frequency.result",
+    "PositioningAccuracy": "hil.positioning.accuracy",
+    "CircularAccuracy": "hil.positioning.circle",
     "Diagnosis": "hil.diagnosis.diagnosis",
     "Verdict": "hil.diagnosis.result",
     # errors
@@ -137,6 +145,8 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "fit_nominal",
     "identify_friction",
     "frf",
+    "positioning_accuracy",
+    "circular_accuracy",
     "diagnose",
     "explain",
     "design_experiment",
@@ -152,6 +162,8 @@ __all__ = [  # noqa: RUF022  (in the order of use, as in the documentation)
     "LIBRARY",
     "Comparison",
     "FrequencyResponse",
+    "PositioningAccuracy",
+    "CircularAccuracy",
     "Diagnosis",
     "Verdict",
     "HilError",

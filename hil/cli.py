@@ -30,6 +30,7 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.commands.install_service import install_service
 from hil.commands.investigate import investigate
+from hil.commands.iso230 import iso230
 from hil.commands.latency import latency
 from hil.commands.paper import paper
 from hil.commands.prove import prove
@@ -97,6 +98,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("investigate", investigate),
     ("friction", friction),
     ("frf", frf),
+    ("iso230", iso230),
     ("paper", paper),
     ("prove", prove),
     ("validate", validate),

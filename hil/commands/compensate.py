@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from hil.compensating.controllers import Controller
 from hil.report.console import out, table
 
 
@@ -22,6 +23,10 @@ def compensate(
     fade_in_s: Annotated[
         float, typer.Option("--fade-in", min=0.0, help="Time in which the compensation fades in [s].")
     ] = 1.0,
+    controllers: Annotated[
+        list[Controller] | None,
+        typer.Option("--for", help="Write the tables for this controller too, beside the bench file; repeatable."),
+    ] = None,
 ) -> None:
     """Turn a diagnosis into a compensation: tables, the gain that they promise, and the bench file that has them."""
     from datetime import date
@@ -29,6 +34,7 @@ def compensate(
     from hil.bench.bench_file import Bench, load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.compensating.compensate import plan_compensation, section_of
+    from hil.compensating.controllers.write_controllers import controller_files, write_files
     from hil.compensating.derive import size
     from hil.control.compensation_tables import Adds
     from hil.diagnosis.result import Result
@@ -73,5 +79,12 @@ def compensate(
         out.print("No diagnosis.json beside the bench: the prediction has no interval.")
     if made.harms:
         raise HilError(f"refused, nothing written: {'; '.join(made.harms)}")
+    files = controller_files(controllers or (), diagnosed, made.compensation, motion, target)
+    written = write_files(files.values(), target)
     write_bench(compensated, target)
+    for controller, made_for in files.items():
+        for name, reason in made_for.not_taken:
+            out.print(f"Not for {controller}: {name}: {reason}.")
+    for path in written:
+        out.print(f"Table: {path}")
     out.print(f"Bench: {target}; off by `compensation: enabled: false`")

@@ -16,6 +16,7 @@ GUIDE = (
     "wrong-axis",
     "profile",
     "frequency-response",
+    "iso-230",
     "drive",
     "real-time",
     "python",

@@ -36,6 +36,8 @@ VERBS = [
     "fit_nominal",
     "identify_friction",
     "frf",
+    "positioning_accuracy",
+    "circular_accuracy",
     "diagnose",
     "explain",
     "design_experiment",
@@ -53,6 +55,8 @@ NOUNS = [
     "LIBRARY",
     "Comparison",
     "FrequencyResponse",
+    "PositioningAccuracy",
+    "CircularAccuracy",
     "Diagnosis",
     "Verdict",
 ]

@@ -25,6 +25,14 @@ def test_a_comparison_without_plots_writes_its_numbers(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "compared").iterdir()] == ["compare.json"]
 
 
+def test_figures_of_iso_230_without_plots_are_numbers(tmp_path: Path) -> None:
+    rows = [f"{target},{error}" for error in (1, 2) for target in (10, 25, 60, 60, 25, 10)]
+    (tmp_path / "laser.csv").write_text("\n".join(["target_mm,deviation_um", *rows]) + "\n")
+    ran = base("from hil.cli import main; main()", "iso230", tmp_path / "laser.csv", "--out", tmp_path / "judged")
+    assert ran.returncode == 0, ran.stderr
+    assert [path.name for path in (tmp_path / "judged").iterdir()] == ["iso230.json"]
+
+
 def test_what_explains_and_diagnoses_needs_no_plots() -> None:
     ran = base("import hil.explanation, hil.investigation, hil.report.summary, hil.report.friction_report")
     assert ran.returncode == 0, ran.stderr

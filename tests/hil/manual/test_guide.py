@@ -15,7 +15,9 @@ from guide_pages import NEEDS_HARDWARE, ROOT, Step, prepared, run, steps
 
 from hil.manual.topics import FOLDER, GUIDE, TOPICS, for_terminal, guide_page, title
 
-SLOW = re.compile(r"hil (demo|explain|diagnose|investigate|compare|identify)\b|--seconds|hil\.diagnose")
+SLOW = re.compile(
+    r"hil (demo|explain|diagnose|investigate|compare|identify)\b|--seconds|hil\.diagnose|profiles/(positioning|circle)"
+)
 
 
 def at_the_desk(topic: str) -> list[Step]:

@@ -11,8 +11,10 @@ from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import structure_left
 from hil.diagnosis.verdict.each_alone import Change, changed
+from hil.diagnosis.verdict.findings import corrections
 from hil.diagnosis.verdict.reproduction import reproduction
 from hil.diagnosis.verdict.unnamed import unnamed_terms
+from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
@@ -94,10 +96,22 @@ def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
 
 
 def refit_matters(given: Fit, nominal: Fit) -> bool:
-    """True if evidence and a material share of energy support the refitted nominal parameters."""
+    """True if evidence and a material share of energy support the refitted nominal parameters, and one of them is told
+    to be another: an open delay of the torque is no parameter of the axis.
+    """
+    if not told_apart(nominal):
+        return False
     paid = nominal.hypothesis.x.size * float(np.log(nominal.rows))
     enough = bic_gain(nominal, given) - paid > CRITERIA.evidence
     return enough and given.cost - nominal.cost > CRITERIA.material * nominal.noise_energy
+
+
+def told_apart(nominal: Fit) -> bool:
+    """True if a refitted parameter is beyond its standard errors from the bench file, or at the end of its range."""
+    if set(nominal.at_bound) - {DELAY} or not nominal.jacobian.size:
+        return True
+    changed = corrections(nominal.bench, nominal).values()
+    return any(abs(one.value - one.nominal) > CRITERIA.sigmas * one.std for one in changed)
 
 
 def _better(change: Change | None, nominal: Fit, final: Fit, held_out: Dataset) -> Change | None:

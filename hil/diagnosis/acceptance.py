@@ -139,7 +139,7 @@ def _repeats(of: Ablation, c: Criteria) -> Answer | None:
 
 
 def _strength(of: Ablation, c: Criteria) -> Answer:
-    return of.strength > 1.0, {"strength": of.strength}
+    return of.clear, {}
 
 
 def _moves(of: Ablation, c: Criteria) -> Answer:
@@ -279,8 +279,8 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
     # sandwich estimator of `standard_errors`
     Rule(
         "strength",
-        "its strength is {strength:.3g} standard errors",
-        "its strength is {strength:.3g} standard errors",
+        "its strength is above its standard error",
+        "its strength is below its standard error",
         _strength,
     ),
     _TORQUE,

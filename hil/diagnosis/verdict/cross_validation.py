@@ -8,7 +8,6 @@ also falls if its strength is within its standard error, if it worsens a channel
 if it changes only what the noise of the sensors does, see `noise_free`.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -43,7 +42,7 @@ class Ablation:
     `held_out` are its residual energy without the term over that with it, `laps` the same ratio of the part
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
-    term changes the held-out residuals as it does those in training. `strength`: over its standard error.
+    term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
     `quiet`: it hardly acts on motion without noise. `torque`: that which held-out motion needs beyond that
     of the twin, over its deviation (rms), with the term and without; None for an error of a sensor. `harm`:
     each channel with it and without it.
@@ -57,7 +56,7 @@ class Ablation:
     gain: float | None
     laps: float | None
     acts: bool = False
-    strength: float = math.inf
+    clear: bool = True
     quiet: bool = False
     torque: tuple[float, float] | None = None
     harm: Mapping[str, Harm] = field(default_factory=dict)
@@ -173,7 +172,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
-            strength_over_error(final, index) if final.jacobian.size else math.inf,
+            not final.jacobian.size or strength_over_error(final, index) > 1.0,  # without a Jacobian it is not told
             _quiet(final, other),
             torque_of(final, other, term, held_out),
             harm(final, other, given),

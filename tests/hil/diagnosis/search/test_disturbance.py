@@ -10,7 +10,7 @@ import pytest
 from concealed_run import concealed_run
 from diagnosis_runs import bench
 
-from hil.diagnosis.search.disturbance import Disturbance, other_orders, friction_zones, lines_hz, scale_periods
+from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz, other_orders, scale_periods
 from hil.identification.measured import take
 
 OWNER = bench()

@@ -49,7 +49,7 @@ def judge(tested: Tested) -> Judged:
     verdict = law.verdict(of_plant)
     is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
-        final = searched.given if of_plant is Verdict.NO_MISMATCH else refit.fit
+        final = searched.given if given_stands(searched.given, held_out) else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
     left = structure_left(final, held_out)
@@ -65,11 +65,16 @@ def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) ->
     if final.terms and accepted(explanation(nominal, final, held_out)):
         return Verdict.MISSING_PHYSICS
     matters = refit_matters(given, nominal)
-    if (given.at_floor or given.within_noise) and accepted(reproduction(given, held_out)):
+    if given_stands(given, held_out):
         return Verdict.NO_MISMATCH
     if accepted(reproduction(nominal, held_out)):
         return Verdict.PARAMETER_ERROR if matters else Verdict.NO_MISMATCH
     return Verdict.UNEXPLAINED
+
+
+def given_stands(given: Fit, held_out: Dataset) -> bool:
+    """True if the bench file as it is reproduces the recordings."""
+    return (given.at_floor or given.within_noise) and accepted(reproduction(given, held_out))
 
 
 def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:

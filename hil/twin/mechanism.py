@@ -271,10 +271,16 @@ class Mechanism:
     def _has_size(self, values: Sequence[float]) -> bool:
         """Check that a strength is off the bound at which there is no effect, and off its largest value.
 
-        Shares may be 1; at the bound of another dimension the recordings do not tell the strength.
+        A share may be the whole; at another bound the recordings do not tell the strength.
         """
         sizes = [(v, p) for v, p in zip(values, self.parameters, strict=False) if p.role is Role.STRENGTH]
-        if any(p.dimension is not Dimension.RATIO and abs(v) >= (1.0 - _AT_BOUND) * p.high for v, p in sizes):
+        if any(
+            abs(v) >= (1.0 - _AT_BOUND) * abs(end) > 0.0 and v * end > 0.0
+            for v, p in sizes
+            for end in (p.low, p.high)
+            if p.dimension is not Dimension.RATIO or abs(end) != 1.0
+            if end == p.high or end < 0.0
+        ):
             return False
         return not self.neutral_at_zero or any(abs(v - max(p.low, 0.0)) > _ROUNDING * p.high for v, p in sizes)
 

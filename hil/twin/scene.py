@@ -15,6 +15,10 @@ def _all(level: float) -> float:
     return 1.0
 
 
+def _none(line_hz: float) -> float:
+    return 0.0
+
+
 @dataclass(frozen=True)
 class AxisFacts:
     """Facts of an axis that typical values and limits of validity are scaled by; motor units."""
@@ -32,6 +36,7 @@ class AxisFacts:
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
     # share of the rows in which the axis moves whose |torque command| is above a level
     driven: Callable[[float], float] = _all
+    swings: Callable[[float], float] = _none  # share of the motion's energy in a line [Hz]
 
     @property
     def friction(self) -> float:

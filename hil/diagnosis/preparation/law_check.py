@@ -23,7 +23,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.added_command import added_windows, axis_felt, without_added
 from hil.diagnosis.preparation.usable_law import LawCheck, set_aside
-from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.facts import axis_facts
 from hil.diagnosis.value import Correction
 from hil.identification.law.fit import counting_noise, fit_law
 from hil.identification.law.result import LawFit, preferred, sure

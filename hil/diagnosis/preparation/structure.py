@@ -16,6 +16,7 @@ from hil.diagnosis.preparation.usable_law import set_aside
 from hil.diagnosis.stages import Prepared, Searched
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import prepare_dataset
+from hil.identification.measured import Measured, later
 from hil.identification.residual_scales import inertia
 
 _ONE = (
@@ -52,17 +53,23 @@ def as_plant_alone(prepared: Prepared) -> Prepared | None:
 
 
 def without_open_delay(searched: Searched) -> Prepared | None:
-    """The recordings beside a twin whose torque acts at once, where the search left its delay at the bound; else None.
+    """The recordings beside a twin without a delay of the torque, where the search left it at the bound; else None.
 
-    A delay given in the bench file stays.
+    A delay given in the bench file stays. The rows of a logger are samples: they act half a row to either side of their
+    instants.
     """
     prepared = searched.prepared
     if DELAY not in searched.final.at_bound or prepared.law.bench.torque_delay_s is not None:
         return None
     control = prepared.bench.control.model_copy(update={DELAY: None})
     bench = prepared.bench.model_copy(update={"control": control})
-    data = prepare_dataset(prepared.train.runs, bench)
-    return replace(prepared, bench=bench, train=data, held_out=data.over(prepared.held_out.runs))
+    data = prepare_dataset([_sampled(run) for run in prepared.train.runs], bench)
+    held_out = data.over([_sampled(run) for run in prepared.held_out.runs])
+    return replace(prepared, bench=bench, train=data, held_out=held_out)
+
+
+def _sampled(run: Measured) -> Measured:
+    return replace(run, torque=later(run.torque, -0.5), torque_command=later(run.torque_command, -0.5))
 
 
 def rigid(bench: Bench) -> Bench:

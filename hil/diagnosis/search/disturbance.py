@@ -22,6 +22,7 @@ _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder coun
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
 _BINS = 400  # of the travel, for zones of friction
 _ORDERS = np.arange(1, 161)  # of the motor angle: slots, pole passings, and their common multiples
+_SLOWER, _REPEATS = 1.1, 4.0  # turns of the motor beyond its own, and periods over the travel, of what turns slower
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,17 +93,19 @@ def orders(
     return list(dict.fromkeys((*best, *beside, 1.0, 2.0)))
 
 
-def fine_orders(runs: Sequence[Measured], disturbances: Sequence[Disturbance], angle_per_unit: float) -> list[float]:
-    """The order above all of `orders` with the largest disturbance, as of a gear in front of the encoder; or none."""
+def other_orders(runs: Sequence[Measured], disturbances: Sequence[Disturbance], angle_per_unit: float) -> list[float]:
+    """The orders above and below all of `orders` with the largest disturbance, as of a gear in front of the encoder, or
+    of a pulley or wheel that turns slower than the motor; none without motion."""
     turns = [angle_per_unit * run.motor[d.sliding] / (2.0 * np.pi) for run, d in zip(runs, disturbances, strict=True)]
     rates = np.concatenate([np.abs(d.velocity[d.sliding]) for d in disturbances]) * angle_per_unit / (2.0 * np.pi)
     if not rates.size or not np.any(rates):
         return []
-    longest, shortest = 1.0 / float(_ORDERS[-1]), float(np.median(rates)) / _PASS_HZ
-    if shortest >= longest:
-        return []
-    torque = np.concatenate([d.torque[d.sliding] for d in disturbances])
-    found = strongest_periods(np.concatenate(turns), torque, shortest / 4.0, shortest, 1, longest)
+    angle, torque = np.concatenate(turns), np.concatenate([d.torque[d.sliding] for d in disturbances])
+    highest, shortest = 1.0 / float(_ORDERS[-1]), float(np.median(rates)) / _PASS_HZ
+    found = strongest_periods(angle, torque, shortest / 4.0, shortest, 1, highest) if shortest < highest else []
+    longest = float(np.ptp(angle)) / _REPEATS
+    if longest > _SLOWER:
+        found += strongest_periods(angle, torque, _SLOWER / 32.0, _SLOWER, 1, longest)
     return [1.0 / period for period in found]
 
 

@@ -17,7 +17,8 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, accepted, examine
 from hil.diagnosis.search.addition import removed
 from hil.diagnosis.search.events import beside_loads, revised
-from hil.diagnosis.search.initial_values import axis_facts, claimable
+from hil.diagnosis.search.facts import axis_facts
+from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.next_term import Additions, SearchRound, first_standing, next_term
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended

@@ -8,28 +8,22 @@ varies along the screw have the same effect. After a search found one of these s
 started at strengths with the same torque at creep, where all torque is Coulomb friction.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search import disturbance as estimate
-from hil.identification.derivatives import motion, rows_per_sample
-from hil.identification.least_squares import least_squares
+from hil.diagnosis.search.facts import axis_facts
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
 from hil.identification.terms import Term, Window, free_slot
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Block, Mechanism, Variant
 from hil.twin.parameter import Dimension, Role
-from hil.twin.scene import AxisFacts, Scene
-
-_MOVES = 0.01  # of the largest step of the motor in a row: above rest and noise
+from hil.twin.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -54,66 +48,6 @@ class StartPoint:
         return Term(self.effect, self.variant, self.values if values is None else values, windows=self.windows)
 
 
-def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
-    """Collect facts of the axis, with the nominal parameters of `bench`, and of its recordings."""
-    physics, table, limit = bench.axis.physics(), bench.encoders.table, bench.gains.torque_limit_n_m
-    peak = max((float(np.max(np.abs(run.torque))) for run in runs), default=0.0)
-    ratio = bench.axis.ratio_m_rad
-    apart = [lost_motion_m(run) for run in runs if run.table_m.size]
-    return AxisFacts(
-        coulomb=physics.coulomb_n_m,
-        ratio=ratio,
-        angle_per_unit=physics.angle_per_unit,
-        rated_torque=limit / 3.0 if np.isfinite(limit) else peak,
-        table_count_m=table.resolution_m if table is not None else None,
-        duration_s=max((run.motor.size * run.period_s for run in runs), default=0.0),
-        travel_m=max((ratio * float(np.ptp(run.motor)) for run in runs), default=math.inf),
-        positions_m=(
-            min((ratio * float(np.min(run.motor)) for run in runs), default=-math.inf),
-            max((ratio * float(np.max(run.motor)) for run in runs), default=math.inf),
-        ),
-        lost_m=max(apart, default=math.inf),
-        turn_known=physics.turn_known,
-        held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
-        driven=lambda level: _driven(runs, level),
-    )
-
-
-@lru_cache(maxsize=64)
-def lost_motion_m(run: Measured) -> float:
-    """Largest lost motion [m] that the encoders of a run can hide, by least squares without a twin.
-
-    Twice the part of their difference that changes with the direction, beside ratio and lateness, and three standard
-    errors of it, and the range of what is left. Infinite where direction and lateness are not told apart.
-    """
-    moved = motion(run.motor, run.period_s)
-    columns = {
-        "one": np.ones_like(run.motor),
-        "ratio": moved.position,
-        "late": moved.velocity,
-        "direction": moved.direction,
-    }
-    fit = least_squares(columns, run.table_m, rows_per_sample=rows_per_sample(run.period_s))
-    step = fit["direction"]
-    return 2.0 * (abs(step.value) + CRITERIA.sigmas * step.std_error) + float(np.ptp(fit.residual))
-
-
-def _driven(runs: Sequence[Measured], level: float) -> float:
-    """Share of the rows in which the motor moves whose |torque command| is above a level [motor unit]."""
-    steps = [np.abs(np.diff(run.motor, append=run.motor[-1])) for run in runs]
-    rows = [
-        np.abs(run.torque_command[step > _MOVES * step.max()]) > level for run, step in zip(runs, steps, strict=True)
-    ]
-    return float(np.mean(np.concatenate(rows))) if any(part.size for part in rows) else 1.0
-
-
-def _held_s(run: Measured, level: float) -> float:
-    """Longest time for which the absolute torque command stays at a level or above [s]."""
-    below = np.flatnonzero(np.abs(run.torque_command) < level)
-    ends = np.concatenate([[-1], below, [run.torque_command.size]])
-    return float(np.max(np.diff(ends)) - 1) * run.period_s
-
-
 def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
     """Estimate the quantities that starting values are computed from.
 
@@ -135,7 +69,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     periods = estimate.friction_periods(runs, disturbances, ratio)
     if physics.turn_known:
         orders = estimate.orders(runs, disturbances, physics.angle_per_unit)
-        orders += estimate.fine_orders(runs, disturbances, physics.angle_per_unit)
+        orders += estimate.other_orders(runs, disturbances, physics.angle_per_unit)
     else:
         orders = estimate.waves(runs, disturbances, ratio)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]

@@ -18,7 +18,8 @@ found are fitted once more, from the parameters of the bench file and typical va
 from dataclasses import replace
 from functools import partial
 
-from hil.diagnosis.search.initial_values import axis_facts, stretches
+from hil.diagnosis.search.facts import axis_facts
+from hil.diagnosis.search.initial_values import stretches
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.successive_halving import LONG, SEARCH_ACCURACY, given_points, race
 from hil.identification.coordinates import LAST_EDGE_STEP_S

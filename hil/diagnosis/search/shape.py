@@ -23,7 +23,7 @@ from scipy.stats import t as student
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.facts import axis_facts
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.structure_left import TORQUE, channels, least_energy, left_in_channel
 from hil.identification.dataset import Dataset

@@ -11,8 +11,10 @@ from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import structure_left
 from hil.diagnosis.verdict.each_alone import Change, changed
+from hil.diagnosis.verdict.findings import corrections
 from hil.diagnosis.verdict.reproduction import reproduction
 from hil.diagnosis.verdict.unnamed import unnamed_terms
+from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
@@ -47,7 +49,7 @@ def judge(tested: Tested) -> Judged:
     verdict = law.verdict(of_plant)
     is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
-        final = searched.given if of_plant is Verdict.NO_MISMATCH else refit.fit
+        final = searched.given if given_stands(searched.given, held_out) else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
     left = structure_left(final, held_out)
@@ -63,11 +65,16 @@ def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) ->
     if final.terms and accepted(explanation(nominal, final, held_out)):
         return Verdict.MISSING_PHYSICS
     matters = refit_matters(given, nominal)
-    if (given.at_floor or given.within_noise) and accepted(reproduction(given, held_out)):
+    if given_stands(given, held_out):
         return Verdict.NO_MISMATCH
     if accepted(reproduction(nominal, held_out)):
         return Verdict.PARAMETER_ERROR if matters else Verdict.NO_MISMATCH
     return Verdict.UNEXPLAINED
+
+
+def given_stands(given: Fit, held_out: Dataset) -> bool:
+    """True if the bench file as it is reproduces the recordings."""
+    return (given.at_floor or given.within_noise) and accepted(reproduction(given, held_out))
 
 
 def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
@@ -94,10 +101,22 @@ def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
 
 
 def refit_matters(given: Fit, nominal: Fit) -> bool:
-    """True if evidence and a material share of energy support the refitted nominal parameters."""
+    """True if evidence and a material share of energy support the refitted nominal parameters, and one of them is told
+    to be another: an open delay of the torque is no parameter of the axis.
+    """
+    if not told_apart(nominal):
+        return False
     paid = nominal.hypothesis.x.size * float(np.log(nominal.rows))
     enough = bic_gain(nominal, given) - paid > CRITERIA.evidence
     return enough and given.cost - nominal.cost > CRITERIA.material * nominal.noise_energy
+
+
+def told_apart(nominal: Fit) -> bool:
+    """True if a refitted parameter is beyond its standard errors from the bench file, or at the end of its range."""
+    if set(nominal.at_bound) - {DELAY} or not nominal.jacobian.size:
+        return True
+    changed = corrections(nominal.bench, nominal).values()
+    return any(abs(one.value - one.nominal) > CRITERIA.sigmas * one.std for one in changed)
 
 
 def _better(change: Change | None, nominal: Fit, final: Fit, held_out: Dataset) -> Change | None:

@@ -6,7 +6,7 @@ nor its time constant, and is there all the same.
 
 import math
 
-from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.facts import axis_facts
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
 from hil.twin.library import BY_ID

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.search.initial_values import axis_facts, block_observed, observable
+from hil.diagnosis.search.facts import axis_facts
+from hil.diagnosis.search.initial_values import block_observed, observable
 from hil.identification.estimator import Fit
 from hil.identification.parallel import POOL
 from hil.identification.terms import Term

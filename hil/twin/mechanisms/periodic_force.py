@@ -16,6 +16,7 @@ from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 _LEAST_WAVES = 5.0  # in the recording: fewer are a drift
+_OWN = 0.5  # share of the motion's energy above which the motion is a swing of this line
 
 
 @njit
@@ -25,8 +26,11 @@ def _shake(value: float, at: Moment, parameters: Row, memory: Row) -> float:
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the recording holds enough waves."""
-    return values[1] * axis.duration_s >= _LEAST_WAVES
+    """Check that the recording holds enough waves, and that the motion is not itself of this line.
+
+    Whatever an axis that swings lacks repeats with the swing.
+    """
+    return values[1] * axis.duration_s >= _LEAST_WAVES and axis.swings(values[1]) < _OWN
 
 
 MECHANISM = Mechanism(

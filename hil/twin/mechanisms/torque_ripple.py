@@ -22,7 +22,7 @@ MECHANISM = Mechanism(
     source="Jahns and Soong, IEEE Trans. Industrial Electronics 43 (1996) 321, ripple torque",
     parameters=(
         Parameter("fraction", Dimension.RATIO, 0.0, 0.5, role=Role.STRENGTH),
-        Parameter("cycles_per_rev", Dimension.COUNT, 1.0, 5e3, role=Role.ORDER),
+        Parameter("cycles_per_rev", Dimension.COUNT, 0.01, 5e3, role=Role.ORDER),
         Parameter("phase_rad", Dimension.ANGLE, -2.0 * math.pi, 2.0 * math.pi, role=Role.PHASE),
     ),
     variants=(Variant(Stage.TORQUE, _rippling_torque),),

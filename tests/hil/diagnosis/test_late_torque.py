@@ -29,5 +29,5 @@ def test_a_late_torque_is_named_beyond_what_a_row_may_do(tmp_path: Path, late_ro
     named = [one for one in diagnosis.result.missing if one.effect == "channel_time_skew"]
     assert len(named) == (1 if late_rows else 0)
     for one in named:
-        # a position that is early is a torque that is late; a row of torque that is a sample acts half a row early
-        assert abs(one.parameters["delay_s"].value) == pytest.approx((late_rows + 0.5) * 1e-3, abs=0.2e-3)
+        # a position that is early is a torque that is late
+        assert abs(one.parameters["delay_s"].value) == pytest.approx(late_rows * 1e-3, abs=0.2e-3)

@@ -19,7 +19,7 @@ from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.pictures.laws import LAWS
 from hil.diagnosis.pictures.view import around, view_of
 from hil.diagnosis.result import Result, Unexplained, Verdict
-from hil.diagnosis.search.initial_values import axis_facts
+from hil.diagnosis.search.facts import axis_facts
 from hil.diagnosis.verdict.cross_validation import CrossValidation
 from hil.identification.honest_refit import Refit
 from hil.identification.hypothesis import Hypothesis

@@ -10,7 +10,7 @@ import pytest
 from concealed_run import concealed_run
 from diagnosis_runs import bench
 
-from hil.diagnosis.search.disturbance import Disturbance, fine_orders, friction_zones, lines_hz, scale_periods
+from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz, other_orders, scale_periods
 from hil.identification.measured import take
 
 OWNER = bench()
@@ -57,7 +57,17 @@ def test_a_ripple_finer_than_160_per_turn_is_found_within_less_than_a_turn() -> 
     noise = np.random.default_rng(3).normal(0.0, 1.0, t.size)
     ripple = Disturbance(np.sin(200.0 * angle) + noise, velocity, np.abs(velocity) > 0.05)
     run = SimpleNamespace(motor=angle, period_s=2e-3)
-    (order,) = fine_orders([run], [ripple], 1.0)
+    order = other_orders([run], [ripple], 1.0)[0]
     assert order == pytest.approx(200.0, abs=0.7)
     still = Disturbance(noise, np.zeros(t.size), np.zeros(t.size, dtype=bool))
-    assert fine_orders([run], [still], 1.0) == []
+    assert other_orders([run], [still], 1.0) == []
+
+
+def test_a_ripple_of_what_turns_slower_than_the_motor_is_found() -> None:
+    t = np.arange(20_000) * 2e-3
+    angle = 150.0 * np.sin(0.6 * t)  # rad: some 48 turns of the motor
+    velocity = np.gradient(angle, 2e-3)
+    noise = np.random.default_rng(3).normal(0.0, 1.0, t.size)
+    ripple = Disturbance(0.5 * np.sin(0.505 * angle) + noise, velocity, np.abs(velocity) > 0.05)
+    run = SimpleNamespace(motor=angle, period_s=2e-3)
+    assert other_orders([run], [ripple], 1.0)[-1] == pytest.approx(0.505, abs=0.01)

@@ -11,7 +11,8 @@ from diagnosis_runs import bench, dataset, evaluated, fitted, one_way, recorded
 from geared_axis import geared
 
 from hil.bench.bench_file import MechanismEntry, load_bench
-from hil.diagnosis.search.initial_values import axis_facts, claimable, likenesses, observable
+from hil.diagnosis.search.facts import axis_facts
+from hil.diagnosis.search.initial_values import claimable, likenesses, observable
 from hil.diagnosis.search.score_test import offered
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis

@@ -34,6 +34,12 @@ def investigate(
         ),
     ] = None,
     rounds: Annotated[int, typer.Option(min=1, max=10, help="Largest number of rounds.")] = 3,
+    compensate: Annotated[
+        bool,
+        typer.Option(
+            "--compensate", help="Then compensate what was found, and keep what helps on the motions of --validate."
+        ),
+    ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="On a real bench: run designed motions without asking.")] = False,
     virtual: Virtual = False,
     force: Force = False,
@@ -45,8 +51,11 @@ def investigate(
     Designed motions stay within the travel and the limits of the recorded set-points and within drive.travel_m of the
     bench. On a real bench each one is shown and must be confirmed.
     """
+    from hil.bench.bench_file import Bench, load_bench
     from hil.commands.run import named, say
     from hil.commands.warm_up import compile_kernels
+    from hil.compensating.trial import try_compensation
+    from hil.compensating.trial_page import HEADERS, rows_of, write_trial
     from hil.diagnosis.wording import title, titles
     from hil.errors import InputError
     from hil.files.optional_library import page_line
@@ -57,8 +66,11 @@ def investigate(
     from hil.loop.simulated_bench import load_simulated
     from hil.loop.supervision import Ending
     from hil.motion.profile import load_profile
+    from hil.report.compare_report import write_bench
     from hil.report.diagnosis_report import write_diagnosis
 
+    if compensate and not validate:
+        raise InputError("--compensate: given without --validate, allowed with a motion to measure the gain on")
     files = {path.stem: path for path in (*profiles, *(validate or []))}
     if len(files) < len(profiles) + len(validate or []):
         raise InputError(
@@ -72,10 +84,10 @@ def investigate(
     simulation = loaded.simulation
     seeds = itertools.count(seed if seed is not None else simulation.seed if simulation else 0)
 
-    def run(profile: Profile, place: Path, name: str) -> RunResult:
+    def run(profile: Profile, place: Path, name: str, on: Bench = loaded) -> RunResult:
         with named(bench, files.get(name, place / f"{name}.yaml")):
             ran = run_profile(
-                loaded,
+                on,
                 profile,
                 place,
                 name,
@@ -86,7 +98,8 @@ def investigate(
                     f"{name} on {loaded.name}: {trajectory.duration_s:.1f} s of motion ..."
                 ),
             )
-        say(ran, virtual)
+        if on is loaded:
+            say(ran, virtual)
         if ran.outcome.ending is Ending.INTERRUPTED:
             raise typer.Exit(130)
         return ran
@@ -113,6 +126,29 @@ def investigate(
         ],
     )
     out.print(f"\n{found.diagnosis.result.statement}\n\n{found.ended}\n\n{page_line(folder / 'report.html')}")
+    if compensate:
+        if not all(allowed(profile) for profile in proving.values()):
+            out.print("The compensation was not tried: it was not confirmed.")
+            return
+        with progress() as tell:
+            tell("trying the compensation")
+            trial = try_compensation(
+                loaded,
+                found.diagnosis.bench,
+                found.diagnosis.result,
+                proving,
+                folder / "compensation",
+                lambda on, profile, place, name: run(profile, place, name, on),
+            )
+            write_trial(trial, loaded, folder)
+        table(HEADERS, rows_of(trial), right=False)
+        out.print(f"\n{trial.statement}\n\n{page_line(folder / 'compensation.html')}")
+        if trial.section:
+            diagnosed = load_bench(folder / "bench.diagnosed.yaml").model_dump(mode="json")
+            write_bench(
+                Bench.model_validate(diagnosed | {"compensation": trial.section}), folder / "bench.compensated.yaml"
+            )
+            out.print(f"Bench: {folder / 'bench.compensated.yaml'}")
 
 
 def _confirmed(profile: Profile, period_s: float) -> bool:

@@ -1,0 +1,187 @@
+"""Try a compensation on the bench: errors of motions before, as predicted, and after; what does not help is left out.
+
+Each motion is run twice as the axis is: the difference of the two is what a repetition changes. An entry is kept if the
+error that it is for is larger without it by more than that. So a wrong or an old table costs runs, and no accuracy.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.compensating.compensate import DRAWS, Plan, plan_compensation, section_of
+from hil.compensating.derive import Derived
+from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of
+from hil.control.compensation_tables import Adds, CompensationTable
+from hil.diagnosis.result import Result
+from hil.errors import HilError
+from hil.loop.run import RunResult
+from hil.motion.profile import Profile
+from hil.motion.trajectory import plan
+from hil.quantities import quantity
+from hil.recording.recording import Recording, read_recording
+
+RunBench = Callable[[Bench, Profile, Path, str], RunResult]  # bench, profile, folder, name of the recording
+_KINDS = {Adds.TORQUE: "following", Adds.POSITION: "positioning"}
+
+
+@dataclass(frozen=True, eq=False)
+class TriedMotion:
+    """One motion: errors [m] before (twice), by prediction, and after; `recordings`: before and after."""
+
+    name: str
+    before: tuple[Errors, Errors]
+    predicted: Gain
+    after: Errors
+    recordings: tuple[Recording, Recording]
+
+    def noise_m(self, adds: Adds) -> float:
+        """What a repetition of the motion changes of an error."""
+        return abs(self.before[0].of(adds) - self.before[1].of(adds))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What was tried on a bench: the plan with the tables that are kept, and the section of the bench file with them.
+
+    `section` is None where none is kept. `left_out`: name of a table or effect and why. `fade_in_s`: rows before are in
+    no error. `unit`: of positions.
+    """
+
+    section: dict[str, Any] | None
+    plan: Plan
+    motions: tuple[TriedMotion, ...]
+    left_out: tuple[tuple[str, str], ...]
+    fade_in_s: float
+    unit: str = "m"
+
+    @property
+    def statement(self) -> str:
+        """The result as one sentence."""
+        if self.plan.harms:
+            return f"Nothing was run: by the twin {'; '.join(self.plan.harms)}."
+        if self.section is None:
+            return "Nothing is kept: no table improved its error by more than a repetition changes it."
+        parts = []
+        for adds in dict.fromkeys(table.adds for table in self.plan.compensation.tables):
+            before, after = (rms([pair[index] for pair in self.pairs(adds)]) for index in (0, 1))
+            told = (quantity(one, self.unit) for one in (before, after, *(before * one for one in self.interval(adds))))
+            parts.append("the {} error from {} to {} rms (predicted {} to {})".format(_KINDS[adds], *told))
+        return f"On motions that it was not learnt from, the compensation takes {' and '.join(parts)}."
+
+    def pairs(self, adds: Adds) -> list[tuple[float, float]]:
+        """Error of each motion before, mean of both runs, and after."""
+        return [(rms([one.of(adds) for one in motion.before]), motion.after.of(adds)) for motion in self.motions]
+
+    def interval(self, adds: Adds) -> tuple[float, float]:
+        """Smallest and largest predicted share of an error that is left, over motions and draws."""
+        shares = [motion.predicted.interval(adds) for motion in self.motions]
+        return min(low for low, _ in shares), max(high for _, high in shares)
+
+
+def rms(values: Sequence[float]) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def error_series(recording: Recording, bench: Bench, fade_in_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time [s], following error and positioning error without its mean [m], (n,) each, after the fade-in.
+
+    As `prediction.errors_of` has those of the twin; without a linear encoder the table is where the motor is.
+    """
+    ratio, first = bench.axis.ratio_m_rad, round(fade_in_s / bench.period_s)
+    command, motor = recording["position_command_m"], ratio * recording["motor_position_rad"]
+    table = recording.columns.get("table_position_m", motor)
+    added = recording.columns.get("compensation_position_m", np.zeros(len(recording)))
+    fed_back = table if bench.gains.position_from_table else motor - motor[0] + command[0]
+    following, place = (command + added - fed_back)[first:], (table - command)[first:]
+    return recording["time_s"][first:], following, place - place.mean()
+
+
+def measured_errors(recording: Recording, bench: Bench, fade_in_s: float) -> Errors:
+    """Root mean squares of the error series of a recording."""
+    _, following, place = error_series(recording, bench, fade_in_s)
+    return Errors(float(np.sqrt(np.mean(following**2))), float(np.std(place)))
+
+
+def try_compensation(
+    given: Bench,
+    diagnosed: Bench,
+    result: Result,
+    profiles: Mapping[str, Profile],
+    folder: Path,
+    run: RunBench,
+    fade_in_s: float = 1.0,
+) -> Trial:
+    """Derive the compensation of a diagnosed bench, try it on the `given` one, and keep the tables that help.
+
+    `profiles` by name are motions that the diagnosis was not learnt from. Raises HilError if a run stops early or
+    nothing can be compensated.
+    """
+    bench = diagnosed.model_copy(update={"compensation": None})
+    motions = {name: plan(profile, bench.period_s) for name, profile in profiles.items()}
+    widest = max(motions.values(), key=lambda one: float(np.abs(one.velocity_m_s).max()))
+    made = plan_compensation(bench, widest, result, fade_in_s)
+    unit = "rad" if bench.axis.turns else "m"
+    if made.harms:
+        return Trial(None, made, (), made.derived.left_out, fade_in_s, unit)
+
+    def errors(tried: Bench, label: str) -> dict[str, tuple[Errors, Recording]]:
+        found = {}
+        for name, profile in profiles.items():
+            ran = run(tried, profile, folder, f"{name}_{label}")
+            if not ran.complete or ran.recording is None:
+                raise HilError(f"{name}_{label} stopped: {ran.outcome.ending}: {ran.outcome.reason}")
+            recording = read_recording(ran.recording)
+            found[name] = measured_errors(recording, tried, fade_in_s), recording
+        return found
+
+    plain = given.model_copy(update={"compensation": None})
+    before = errors(plain, "before"), errors(plain, "before_again")
+    tables, dropped = list(made.compensation.tables), list[tuple[str, str]]()
+    after = errors(_with(plain, made, tables), "after")
+    for table in made.compensation.tables:
+        rest = [one for one in tables if one is not table]
+        without = errors(_with(plain, made, rest), f"without_{table.name.replace(' ', '_')}") if rest else before[0]
+        worse = rms([one.of(table.adds) for one, _ in without.values()])
+        noise = max(abs(before[0][name][0].of(table.adds) - before[1][name][0].of(table.adds)) for name in profiles)
+        own = rms([one.of(table.adds) for one, _ in after.values()])
+        if worse - own <= noise:
+            tables, after = rest, without
+            kind = _KINDS[table.adds]
+            dropped.append((table.name, f"{kind} error {quantity(own, unit)} with it, {quantity(worse, unit)} without"))
+    kept = replace(made, derived=_only(made.derived, tables))
+    drawn = tuple(drawn_benches(bench, result, DRAWS))
+    tried = [
+        TriedMotion(
+            name,
+            (before[0][name][0], before[1][name][0]),
+            gain_of(bench, motions[name], kept.compensation, drawn, fade_in_s),
+            after[name][0],
+            (before[0][name][1], after[name][1]),
+        )
+        for name in profiles
+    ]
+    section = _section(plain, kept) if tables else None
+    return Trial(section, kept, tuple(tried), (*made.derived.left_out, *dropped), fade_in_s, unit)
+
+
+def _only(derived: Derived, tables: Sequence[CompensationTable]) -> Derived:
+    return replace(derived, compensation=replace(derived.compensation, tables=tuple(tables)))
+
+
+def _with(bench: Bench, made: Plan, tables: Sequence[CompensationTable]) -> Bench:
+    """The bench with some of the tables of a plan."""
+    if not tables:
+        return bench
+    section = _section(bench, replace(made, derived=_only(made.derived, tables)))
+    return Bench.model_validate(bench.model_dump(mode="json") | {"compensation": section})
+
+
+def _section(bench: Bench, made: Plan) -> dict[str, Any]:
+    return section_of(made, Path(bench.name), date.today().isoformat())

@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, FitFigures, Result, Verdict
+from hil.diagnosis.improvement import improvement
+from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, Result, Verdict
 from hil.diagnosis.value import Correction
-from hil.diagnosis.wording import spoken, title
+from hil.diagnosis.wording import title
 from hil.identification.least_squares import SIGMAS
-from hil.identification.noise_floor import FLOOR
 from hil.quantities import percent, quantity
 
 MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effect; the table has all
@@ -17,7 +17,7 @@ MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effe
 def statement(result: Result) -> str:
     """The verdict as one sentence."""
     if result.verdict is Verdict.MISSING_PHYSICS:
-        return f"{_found('Missing physics', result.missing)} {_residual(result)}{_left(result)}"
+        return f"{_found('Missing physics', result.missing)} {improvement(result)}{_left(result)}"
     if result.verdict is Verdict.PARAMETER_ERROR:
         sure = [item for item in result.parameter_corrections.items() if _sure(item[1])]
         worst = sorted(sure, key=lambda item: -_growth(item[1]))
@@ -63,22 +63,6 @@ def _found(before: str, found: Sequence[Finding]) -> str:
 def listed(texts: Sequence[str]) -> str:
     """Join texts as a list of a sentence: "a, b and c"."""
     return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
-
-
-def _residual(result: Result) -> str:
-    """Residual before and after of the channel that improves most."""
-    name, entry = max(result.fit.items(), key=lambda item: _improvement(item[1].train))
-    found = entry.validate_ or entry.train
-    before, after, noise = (
-        quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
-    )
-    where = "held-out" if entry.validate_ else "these"
-    what = f"With it the residual of the {spoken(name)} on {where} recordings"
-    if found.after_rms >= found.best_before_rms:
-        return f"{what} does not fall: {after} instead of {before} rms."
-    if found.after_rms**2 <= FLOOR * found.noise_floor_rms**2:
-        return f"{what} falls from {before} rms to its noise."
-    return f"{what} falls from {before} to {after} rms; its noise is {noise}."
 
 
 def _of_axis(change: AxisChange, result: Result) -> str:
@@ -132,7 +116,3 @@ def _unexplained(result: Result) -> str:
 
 def _depends(result: Result) -> str:
     return f" Structure is left: {result.structure[0].text}." if result.structure else ""
-
-
-def _improvement(found: FitFigures) -> float:
-    return found.best_before_rms / max(found.after_rms, 1e-300)

@@ -33,6 +33,11 @@ def spoken(channel: str) -> str:
     return title(channel.removesuffix(f"_{ending}"))
 
 
+def by_chance(p: float) -> str:
+    """Probability of a structure by chance, in words."""
+    return f"by chance {p:.1g}" if p > 1e-12 else "by chance less than 1e-12"
+
+
 def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
     """Map channels of the twin to names of recorded channels."""
     names = AXIS_CHANNELS[run.kind]

@@ -7,7 +7,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
 from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, Result, Verdict
 from hil.diagnosis.value import Correction
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import listed, named, titles
 from hil.identification.least_squares import SIGMAS
 from hil.quantities import percent, quantity
 
@@ -51,18 +51,20 @@ def _found(before: str, found: Sequence[Finding]) -> str:
     """What is there, in one sentence each; then what may be there, in one clause."""
     likely = [one for one in found if one.confidence >= CRITERIA.likely]
     others = [one for one in found if one not in likely and one.confidence >= MENTIONED]
-    perhaps = listed([f"{title(one.effect)} ({percent(one.confidence)})" for one in others])
+    perhaps = listed([f"{named(one)} ({percent(one.confidence)})" for one in others])
     if not likely:
         likely = [max(found, key=lambda one: one.confidence)]
-        perhaps = listed([f"{title(one.effect)} ({percent(one.confidence)})" for one in others if one not in likely])
+        perhaps = listed([f"{named(one)} ({percent(one.confidence)})" for one in others if one not in likely])
         before = f"{before}, doubtful by its confidence ({percent(likely[0].confidence)})"
-    told = f"{before}: {' '.join(one.sentence for one in likely)}"
+    told = f"{before}: {' '.join(map(_sentence, likely))}"
     return f"{told} Perhaps also {perhaps}." if perhaps else told
 
 
-def listed(texts: Sequence[str]) -> str:
-    """Join texts as a list of a sentence: "a, b and c"."""
-    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
+def _sentence(one: Finding) -> str:
+    """The sentence of a finding, with its equal rivals."""
+    if not one.equivalents:
+        return one.sentence
+    return f"{one.sentence.removesuffix('.')} (or {titles(one.equivalents)}: these recordings do not separate them)."
 
 
 def _of_axis(change: AxisChange, result: Result) -> str:

@@ -1,10 +1,10 @@
 """Texts for mechanisms, terms and locations."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
-from hil.diagnosis.result import Location
+from hil.diagnosis.result import Finding, Location
 from hil.diagnosis.turning import of_load, speed_unit
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
@@ -31,6 +31,16 @@ def spoken(channel: str) -> str:
     unit = unit_of(channel)
     ending = next((one for one in (unit.replace(" ", "_").lower(),) if channel.endswith(f"_{one}")), "")
     return title(channel.removesuffix(f"_{ending}"))
+
+
+def named(finding: Finding) -> str:
+    """Name a finding with its equal rivals: its confidence is that of the set."""
+    return " or ".join(map(title, (finding.effect, *finding.equivalents)))
+
+
+def listed(texts: Sequence[str]) -> str:
+    """Join texts as a list of a sentence: "a, b and c"."""
+    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
 
 
 def by_chance(p: float) -> str:

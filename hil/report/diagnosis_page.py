@@ -5,11 +5,12 @@ from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.experiment import NEXT_EXPERIMENT
+from hil.diagnosis.open_questions import no_experiment
 from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
 from hil.diagnosis.pictures.structure import structure_figure
 from hil.diagnosis.preparation.split import whole_name
-from hil.diagnosis.result import Result, Verdict
+from hil.diagnosis.result import Verdict
 from hil.diagnosis.statement import explained
 from hil.diagnosis.wording import titles, where
 from hil.figures.drawing import save
@@ -116,14 +117,8 @@ def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
 def _next_experiment(page: Page, diagnosis: Diagnosis) -> None:
     experiment, result = diagnosis.experiment, diagnosis.result
     page.heading("Next experiment")
-    page.text(experiment.note if experiment else _no_experiment(result))
+    page.text(experiment.note if experiment else no_experiment(result))
     if experiment and experiment.profile:
         page.text(
             f"{NEXT_EXPERIMENT} is its profile: run it and diagnose all recordings together; hil investigate does both."
         )
-
-
-def _no_experiment(result: Result) -> str:
-    if result.verdict is Verdict.UNEXPLAINED:
-        return "None was designed: that needs a known control law, and a twin that holds its closed loop."
-    return "No question is open that another motion could answer."

@@ -29,6 +29,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     finding, term = diagnosis.result.findings[index], diagnosis.term_of(index)
     mechanism = BY_ID[finding.effect]
     name = label(term, diagnosis.given_bench)
+    name += "".join(f" or {title(one)}" for one in finding.equivalents)
     name = f"Explains a part: {name}" if diagnosis.result.partial else f"{name[:1].upper()}{name[1:]}"
     turns = diagnosis.given_bench.axis.turns
     page.heading(f"{index + 1}. {name}: {of_load(mechanism.element_of(term.variant), turns)}")
@@ -36,7 +37,8 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     again = f"_{term.slot + 1}" if term.slot else ""
     page.picture(save(figure, folder / f"{term.effect}{again}.png"), of_load(caption, turns))
     sure = f"{100.0 * finding.confidence:.0f} %" if finding.confidence < 0.99 else "above 99 %"
-    page.text(f"{finding.sentence} Confidence {sure}: {finding.needed}.")
+    of_set = " (that one of them is there)" if finding.equivalents else ""
+    page.text(f"{finding.sentence} Confidence {sure}{of_set}: {finding.needed}.")
     page.text(f"{mechanism.equation} ({mechanism.source})")
     if finding.form:
         page.text(f"Reported as part of this curve, because it corrects the curve's form only slightly: {finding.form}")

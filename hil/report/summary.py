@@ -1,7 +1,7 @@
 """Summary of a diagnosis on the terminal."""
 
 from hil.diagnosis.result import Result, TorqueLeft
-from hil.diagnosis.wording import spoken, title
+from hil.diagnosis.wording import named, spoken
 from hil.quantities import percent, quantity
 from hil.report.console import out, table
 
@@ -29,7 +29,7 @@ def print_diagnosis(result: Result) -> None:
         out.print()
         table(
             ("found", "confidence that it is there"),
-            [(title(finding.effect), percent(finding.confidence)) for finding in result.findings],
+            [(named(finding), percent(finding.confidence)) for finding in result.findings],
         )
     if result.torque_left:
         out.print(f"\n{torque_line(result.torque_left)}")

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
-from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, Result, Verdict
+from hil.diagnosis.open_questions import cannot_show
+from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import listed, named, titles
 from hil.identification.least_squares import SIGMAS
@@ -22,22 +23,27 @@ def statement(result: Result) -> str:
         sure = [item for item in result.parameter_corrections.items() if _sure(item[1])]
         worst = sorted(sure, key=lambda item: -_growth(item[1]))
         changes = ", ".join(_changed(name, one) for name, one in worst[:3])
-        if not changes:
-            return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
-        return f"No physics is missing; parameters of the bench file are wrong: {changes}."
+        told = f"parameters of the bench file are wrong: {changes}." if changes else _together(result.torque_left)
+        return " ".join(filter(None, (f"No physics is missing; {told}", cannot_show(result))))
     if result.verdict is Verdict.NO_MISMATCH:
-        return "The twin reproduces these recordings to within their noise."
+        told = _leaves(result.torque_left)
+        noise = f"The twin reproduces these recordings to within their noise{f' and {told}' if told else ''}."
+        return " ".join(filter(None, (noise, cannot_show(result))))
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget and not result.partial:
-        return f"The time budget ended before a mechanism was found: {_unexplained(result)}"
+        return f"The time budget ended before a mechanism was found{_unexplained(result)}"
     if result.partial:
         share = percent(1.0 - result.unexplained.share)
         return (
             f"{'The time budget ended, and no' if result.time_budget else 'No'} mechanism of the library explains the "
             f"whole mismatch. {_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
         )
-    return f"The mismatch is not explained by any mechanism of the library: {_unexplained(result)}"
+    at_floor = result.unexplained.description == AT_FLOOR
+    what = (
+        "No named physics is missing" if at_floor else "The mismatch is not explained by any mechanism of the library"
+    )
+    return f"{what}{_unexplained(result)}"
 
 
 def explained(result: Result) -> bool:
@@ -113,7 +119,33 @@ def _left(result: Result) -> str:
 
 
 def _unexplained(result: Result) -> str:
-    return f"{result.unexplained.description}{_depends(result)}"
+    """What a twin without a name for it leaves: residuals above the noise, else what is below the noise of a row."""
+    if result.unexplained.description != AT_FLOOR:
+        return f": {result.unexplained.description}{_depends(result)}"
+    if result.structure:
+        return f"; below the noise of a row, {result.structure[0].text}."
+    told = _leaves(result.torque_left)
+    return f"; every channel is within its noise{f', and the twin {told}' if told else ''}."
+
+
+def _leaves(left: TorqueLeft | None) -> str:
+    """The share of the torque that a twin leaves, and plain least squares, as a verb; empty if it is not known."""
+    if left is None or left.final is None:
+        return ""
+    return (
+        f"leaves {percent(left.final)} of the torque on held-out motion unexplained, plain least squares "
+        f"{percent(left.plain)}"
+    )
+
+
+def _together(left: TorqueLeft | None) -> str:
+    """Say of parameters that are better together, none of which is surely wrong alone."""
+    told = "its parameters fit better together as refitted, and none of them is surely wrong by itself"
+    if left is None or left.owner is None or left.final is None:
+        return f"{told}."
+    return (
+        f"{told}. The torque left on held-out motion is {percent(left.final)}, by the bench file {percent(left.owner)}."
+    )
 
 
 def _depends(result: Result) -> str:

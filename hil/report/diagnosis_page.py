@@ -10,7 +10,7 @@ from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
 from hil.diagnosis.pictures.structure import structure_figure
 from hil.diagnosis.preparation.split import whole_name
-from hil.diagnosis.result import Verdict
+from hil.diagnosis.result import AT_FLOOR, Verdict
 from hil.diagnosis.statement import explained
 from hil.diagnosis.wording import titles, where
 from hil.figures.drawing import save
@@ -45,7 +45,7 @@ def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> No
     corrections_section(page, result)
     page.heading("What remains unexplained")
     page.text(result.unexplained.description)
-    if result.unexplained.share > 0.0:
+    if result.unexplained.share > 0.0 and result.unexplained.description != AT_FLOOR:
         page.text(f"Unexplained: {percent(result.unexplained.share)} of the energy above the noise.")
     page.items([f"{one.text[:1].upper()}{one.text[1:]}." for one in result.structure])
     _structure(page, diagnosis, folder)

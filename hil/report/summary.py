@@ -2,7 +2,7 @@
 
 from hil.diagnosis.result import Result, TorqueLeft
 from hil.diagnosis.wording import named, spoken
-from hil.quantities import percent, quantity
+from hil.quantities import digits, percent, quantity
 from hil.report.console import out, table
 
 
@@ -23,7 +23,9 @@ def print_diagnosis(result: Result) -> None:
     table(("rms, held out" if held_out else "rms", "before", "after", "noise floor"), rows)
     if result.time_budget:
         out.print(
-            f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
+            f"\nThe search ended with its time budget of {digits(result.time_budget.budget_s)} s before "
+            f"{result.time_budget.stopped_before}: best answer so far. To go on, call it with --budget SECONDS, more "
+            "than these."
         )
     if result.findings:
         out.print()

@@ -76,8 +76,8 @@ def _stopped(searched: Searched, budget_s: float) -> str:
     others = titles(searched.not_tried) if searched.not_tried else "no mechanism"
     return (
         f"The search ended with its time budget of {digits(budget_s)} s before {searched.stopped_at}: this is the "
-        f"best explanation so far; --budget SECONDS (budget_s in Python) gives it more. Not fitted beside it: {others}. "
-        "No next experiment was designed."
+        f"best explanation so far; --budget SECONDS (budget_s in Python) gives it more. "
+        f"Not fitted beside it: {others}. No next experiment was designed."
     )
 
 

@@ -97,7 +97,8 @@ def on_fit(final: Fit) -> list[str]:
         notes.append(
             f"{', '.join(nominal)}: not identifiable from this motion. The fit ended at the bound of the allowed "
             "range, a third or three times the value of the bench file; the value is no correction, and "
-            "bench.diagnosed.yaml has the one of the bench file."
+            "bench.diagnosed.yaml has the one of the bench file. Beside a mass that ended there it has those of the "
+            "other masses, too: their split is not told."
         )
     others = ", ".join(name.split(".")[-1] for name in final.at_bound if name not in nominal)
     if others:

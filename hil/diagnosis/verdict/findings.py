@@ -105,8 +105,8 @@ def corrections(bench_file: Bench, fit: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
     Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
-    bound of the allowed range, or was left as it is, has no correction. Values of the
-    bench's mechanisms are among them.
+    bound of the allowed range, or was left as it is, has no correction, and no mass beside one that did (`not_split`).
+    Values of the bench's mechanisms are among them.
     """
     hypothesis = fit.hypothesis
     told = hypothesis.nominal if fit.data.observability.torque_measured else RATIOS
@@ -122,10 +122,16 @@ def corrections(bench_file: Bench, fit: Fit) -> dict[str, Correction]:
         )
         for before, one, value, std in entries
         if one.name in told
-        and one.name not in (*fit.at_bound, DELAY)
+        and one.name not in (*fit.at_bound, *not_split(bench_file, fit.at_bound), DELAY)
         and not math.isclose(value, before)
         and (before or value > CRITERIA.sigmas * std)
     }
+
+
+def not_split(bench: Bench, at_bound: Sequence[str]) -> tuple[str, ...]:
+    """Masses of the axis if one of them ended at its bound: their sum is told, and no single one."""
+    masses = bench.axis.MASSES
+    return masses if set(masses) & set(at_bound) else ()
 
 
 def diagnosed_bench(bench_file: Bench, fit: Fit) -> Bench:

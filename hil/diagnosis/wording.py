@@ -8,12 +8,9 @@ from hil.diagnosis.result import Finding, Location
 from hil.diagnosis.turning import of_load, speed_unit
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
-from hil.quantities import digits, quantity, unit_of
+from hil.quantities import digits, known_quantity, quantity, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
-
-_SEEN = {"measured": "the measured torque shows it", "hidden": "the measured torque does not show it"}
-_LITTLE = 0.01  # of the largest strength of a mechanism: a harmonic below is not told by its own value
 
 
 def title(effect: str) -> str:
@@ -65,15 +62,15 @@ def label(term: Term, bench: Bench) -> str:
     period_m, order = (mechanism.named(role, term.values) for role in (Role.PERIOD, Role.ORDER))
     if period_m is not None:
         return f"{title(term.effect)}, every {quantity(period_m, 'm')}"
-    which = mechanism.forms[term.variant] if order is None else _wave(order, bench)
+    which = mechanism.forms[term.variant] if order is None else wave(order, bench)
     return f"{title(term.effect)}, {which}"
 
 
-def _wave(order: float, bench: Bench) -> str:
+def wave(order: float, bench: Bench, error: float = 0.0) -> str:
     """How often an effect repeats: per revolution, or along the travel where no revolution is known."""
     if bench.axis.physics().turn_known:
-        return f"{digits(order)} times per revolution"
-    return f"every {quantity(1.0 / order, 'm')} of travel"
+        return f"{known_quantity(order, error, '1/rev')} times per revolution"
+    return f"every {known_quantity(1.0 / order, error / order**2, 'm')} of travel"
 
 
 def unit_in(bench: Bench, parameter: Parameter) -> str:
@@ -83,40 +80,14 @@ def unit_in(bench: Bench, parameter: Parameter) -> str:
     return parameter.dimension.unit(bench.axis.drive_unit, bench.axis.turns)
 
 
-def value_in_words(value: float, parameter: Parameter, bench: Bench) -> str:
-    """Value of a parameter with its unit; edges of windows to a hundredth of a second, early and late ones alike."""
-    return f"{value:.2f} s" if parameter.role is Role.EDGE else quantity(value, unit_in(bench, parameter))
+def value_in_words(value: float, parameter: Parameter, bench: Bench, error: float = 0.0) -> str:
+    """Value of a parameter with its unit, rounded by its standard error where this is given.
 
-
-def sentence(term: Term, bench: Bench) -> str:
-    """Describe a term in a sentence with its values, and its variant in brackets."""
-    mechanism, axis = BY_ID[term.effect], bench.axis
-    variant = mechanism.variants[term.variant]
-    # forms of a transmission are forces, which a rigid axis does not have
-    forms = bool(axis.SPRINGS) or not mechanism.in_transmission
-    told_by = variant.text if variant.text and forms else mechanism.text
-    text, opposite = told_by.sentence, told_by.reversed
-    given = list(term.values)
-    if given[mechanism.strength] < 0.0 and opposite:
-        text, given[mechanism.strength] = opposite, -given[mechanism.strength]
-    values = {}
-    least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
-    for parameter, value in zip(mechanism.parameters, given, strict=True):
-        little = parameter.role is Role.STRENGTH and abs(value) < least
-        told = value_in_words(least if little else value, parameter, bench)
-        values[parameter.name] = f"less than {told}" if little else told
-    order = mechanism.named(Role.ORDER, term.values)
-    values["wave"] = "" if order is None else _wave(order, bench)
-    values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
-    told = of_load(text, axis.turns).format(**values, variant=variant.name)
-    if not variant.name or not forms or "{variant}" in text or variant.name in told:
-        return told
-    return f"{told.removesuffix('.')} ({_variant_in_words(variant.name)})."
-
-
-def _variant_in_words(variant: str) -> str:
-    """The name of a variant, with what it says of the measured torque in words."""
-    return "; ".join(_SEEN.get(word, word) for word in variant.split()) if variant.split()[0] in _SEEN else variant
+    Edges of windows are told to a hundredth of a second, early and late ones alike.
+    """
+    if parameter.role is Role.EDGE:
+        return f"{value:.2f} s"
+    return known_quantity(value, error, unit_in(bench, parameter))
 
 
 def where(location: Location, turns: bool) -> dict[str, str]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hil.bench.bench_file import MechanismEntry
-from hil.diagnosis.wording import sentence
+from hil.diagnosis.sentence import TermErrors, sentence
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -26,10 +26,11 @@ def in_bench(final: Fit, held_out: Dataset) -> str:
             told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
     for kept in hypothesis.kept:
         entry, mechanism = kept.active(), BY_ID[kept.effect]
-        name = f"{entry.effect}.{mechanism.parameters[mechanism.strength].name}"
-        clear = abs(entry.values[mechanism.strength]) > SIGMAS * errors.get(name, 0.0)
+        known = [errors.get(f"{entry.effect}.{one.name}", 0.0) for one in mechanism.parameters]
+        clear = abs(entry.values[mechanism.strength]) > SIGMAS * known[mechanism.strength]
         if clear and matters(final, kept, held_out if held_out.runs else final.data):
-            told.append(sentence(Term(entry.effect, entry.variant, entry.values), final.bench))
+            term = Term(entry.effect, entry.variant, entry.values)
+            told.append(sentence(term, final.bench, TermErrors(known, known[mechanism.strength])))
     return f"The bench has already: {' '.join(told)}" if told else ""
 
 

@@ -5,9 +5,10 @@ from example_result import EXAMPLE
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.result import AT_FLOOR, Location, Result
+from hil.diagnosis.sentence import sentence
 from hil.diagnosis.statement import explained, statement
 from hil.diagnosis.turning import of_load
-from hil.diagnosis.wording import sentence, spoken, where
+from hil.diagnosis.wording import spoken, where
 from hil.identification.terms import Term
 from hil.twin.library import LIBRARY
 

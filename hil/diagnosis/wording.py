@@ -73,6 +73,20 @@ def wave(order: float, bench: Bench, error: float = 0.0) -> str:
     return f"every {known_quantity(1.0 / order, error / order**2, 'm')} of travel"
 
 
+def spoken_key(key: str) -> str:
+    """A key of corrections in words: "constant_load.load_torque_n_m" -> "constant load: load torque".
+
+    That of an axis stays as the bench file has it.
+    """
+    effect, _, name = key.rpartition(".")
+    return f"{title(effect)}: {parameter_of(effect, name).spoken}" if effect in BY_ID else key
+
+
+def parameter_of(effect: str, name: str) -> Parameter:
+    """The parameter of a mechanism by its name."""
+    return next(one for one in BY_ID[effect].parameters if one.name == name)
+
+
 def unit_in(bench: Bench, parameter: Parameter) -> str:
     """SI unit of a parameter of a mechanism on the axis of a bench."""
     if parameter.role is Role.ORDER and not bench.axis.physics().turn_known:

@@ -243,7 +243,7 @@ def _stuck(rival: RivalFit) -> str:
     parameters = BY_ID[rival.terms[-1].effect].parameters
     at = rival.terms[-1].values
     stuck = [
-        parameter.name
+        parameter.spoken
         for parameter, value in zip(parameters, at, strict=True)
         if parameter.dimension is not Dimension.ANGLE and value in (parameter.low, parameter.high)
     ]

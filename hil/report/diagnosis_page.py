@@ -20,12 +20,16 @@ from hil.report.fit_section import corrections_section, fit_section
 from hil.report.ledger_report import ledger_section
 from hil.report.page import Page
 
+LEGEND = (
+    "Colour of the bar: green, all of the mismatch is explained; orange, something is left, doubtful or not searched."
+)
+
 
 def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> None:
     """Write report.html with its PNGs."""
     result = diagnosis.result
     names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))
-    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result))
+    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result), LEGEND)
     findings_section(page, diagnosis, folder)
     _change(page, diagnosis, folder)
     if result.location is not None:

@@ -3,7 +3,7 @@
     FILE -> FOLDER/FILE-map.yaml -> recording -> FOLDER/bench.yaml -> diagnosis -> FOLDER/report/report.html
 
 A map and a bench are drafted where the folder has none. From then on they are the user's: the next explanation takes
-them as they are and writes the report anew.
+them as they are and writes the report anew. Only a drafted bench that nobody edited follows its map and data.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.time_left import BUDGET_S
+from hil.drafting.draft_mark import draft_state, marked
 from hil.drafting.drafted_bench import DraftedBench, drafted
 from hil.errors import InputError
 from hil.exchange.own_file import read_exported
@@ -33,6 +34,10 @@ from hil.recording.recording import Recording, read_recording
 from hil.report.diagnosis_report import write_diagnosis
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
+OUTDATED = (
+    "THE MAP OR THE DATA CHANGED since it was drafted. It was edited, so it is kept, with values of the former map; "
+    "remove it to have it drafted anew"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +120,8 @@ def explain(
         assumed += notes
     progress("taking the bench, or drafting it")
     bench, draft, notes = _bench(read, folder / BENCH)
-    basis = Basis(tuple(read), bench, draft, (*assumed, *notes))
+    warnings = [one for one in notes if OUTDATED in one]
+    basis = Basis(tuple(read), bench, draft, (*warnings, *assumed, *(one for one in notes if one not in warnings)))
     first(basis)
     with rewritten_folder(folder / REPORT, PAGE) as part:
         diagnosis = diagnose(read, (), bench, progress, budget_s)
@@ -151,13 +157,21 @@ def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | No
 
 
 def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedBench | None, list[str]]:
-    """The bench file at `path`, else the bench of the first recording, else a draft; and what was assumed."""
+    """The bench file at `path`, else the bench of the first recording, else a draft; and what was assumed.
+
+    A draft that nobody edited is made anew where the map or the data changed.
+    """
+    state, notes = None, list[str]()
     if is_file(path):
-        return load_bench(path), None, [f"{path}: used as it is"]
-    if "bench" in recordings[0].metadata:
+        state = draft_state(path.read_text(encoding="utf-8"), recordings)
+        if state is None or state.edited or not state.outdated:
+            changed = [f"{path}: {OUTDATED}"] if state and state.outdated else []
+            return load_bench(path), None, [*changed, f"{path}: used as it is"]
+        notes = [f"{path}: drafted anew, as the map or the data changed, and nobody had edited it"]
+    elif "bench" in recordings[0].metadata:
         return bench_of(recordings[0]), None, [f"{recordings[0].name}: the bench with which it was recorded"]
     draft = drafted(recordings)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, draft.text)
-    notes = [f"{path}: masses, friction, lead, gains, encoders; drafted from the recordings alone"]
+    write_text(path, marked(draft.text, recordings))
+    notes.append(f"{path}: masses, friction, lead, gains, encoders; drafted from the recordings alone")
     return draft.bench, draft, [*notes, *(f"{path}: {note}" for note in draft.unsure)]

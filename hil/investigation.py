@@ -9,6 +9,7 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.experiment import NEXT_EXPERIMENT
+from hil.diagnosis.open_questions import no_experiment
 from hil.diagnosis.wording import titles
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
@@ -102,4 +103,4 @@ def _recorded(run: Run, profile: Profile, folder: Path, name: str) -> Recording:
 def _settled(diagnosis: Diagnosis) -> str:
     if diagnosis.experiment:
         return diagnosis.experiment.note
-    return "No question is open that another motion could answer."
+    return no_experiment(diagnosis.result)

@@ -148,6 +148,19 @@ def quantity(value: float, unit: str) -> str:
     return f"{digits(value * factor)} {shown}".rstrip()
 
 
+def known_quantity(value: float, error: float, unit: str) -> str:
+    """Value of an SI unit as text, such as "0.8 mrad", rounded at the first digit of its standard error.
+
+    It has three digits at most, as without an error.
+    """
+    if value == 0.0 or not (math.isfinite(error) and error > 0.0):
+        return quantity(value, unit)
+    factor, shown = reading_unit(unit, value)
+    known = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 1
+    significant = min(max(known, 1), 3)
+    return f"{digits(float(f'{value * factor:.{significant - 1}e}'), significant)} {shown}".rstrip()
+
+
 def percent(value: float) -> str:
     """Ratio in percent with three digits; below 0.001 % only the bound."""
     return f"{digits(100.0 * value)} %" if value >= 1e-5 else "< 0.001 %"

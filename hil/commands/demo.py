@@ -127,7 +127,7 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
     """Print the concealed effect beside the finding."""
     import math
 
-    from hil.diagnosis.wording import title
+    from hil.diagnosis.wording import named, title
     from hil.quantities import digits, quantity, unit_of
     from hil.twin.library import BY_ID
     from hil.twin.parameter import Role
@@ -146,7 +146,7 @@ def _say(result: Result, truth: SimulationSection, believed: Bench) -> None:
         told = [f"{digits(one)} {unit}" for one in (fitted.value, fitted.std)] if fitted else ["–", "–"]
         rows.append((name, f"{digits(getattr(believed.axis, name))} {unit}", f"{digits(value)} {unit}", *told))
     table((title(hidden.effect), "bench file", "concealed", "found", "standard error"), rows)
-    names = " and ".join(title(finding.effect) for finding in result.missing) or title(result.verdict)
+    names = " and ".join(named(finding) for finding in result.missing) or title(result.verdict)
     out.print(
         f"\nConcealed: [bold]{title(hidden.effect)}[/bold]; found: [bold]{names}[/bold]. {_judged(result, hidden)}",
         markup=True,

@@ -41,6 +41,7 @@ def explain(
     Correct what was assumed in the map or the bench of the folder, and call it again.
     """
     from hil.commands.warm_up import compile_kernels
+    from hil.explanation import OUTDATED
     from hil.explanation import explain as explain_files
     from hil.files.optional_library import page_line
     from hil.report.summary import print_diagnosis
@@ -57,6 +58,8 @@ def explain(
             answer=lambda diagnosis: print_diagnosis(diagnosis.result),
             budget_s=budget_s,
         )
+    for warning in (one for one in found.assumed if OUTDATED in one):
+        out.print(f"{warning}.\n")
     out.print(page_line(found.report))
     if show and found.report.exists():
         import webbrowser

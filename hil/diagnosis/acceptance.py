@@ -17,7 +17,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hil.diagnosis.criteria import CRITERIA, Criteria
-from hil.diagnosis.ledger import Answer, Rule
+from hil.diagnosis.ledger import SHAPE, Answer, Rule
 from hil.diagnosis.reproduced import REPRODUCED
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ _MATERIAL: Rule[Addition | Need] = Rule(
 )
 # a torque with noise drives the twin: a term that passes less of it leaves less, and explains nothing
 _SHAPE: Rule[Addition | Need] = Rule(
-    "shape below the noise",
+    SHAPE,
     "its shape is in what the twin leaves below the noise (by chance {chance:.1g})",
     "its shape is not in what the twin leaves below the noise (by chance {chance:.1g}): it only passes less noise",
     _shape,

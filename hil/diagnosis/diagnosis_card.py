@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hil.diagnosis.preparation.split import whole_name
 from hil.diagnosis.statement import explained
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import named, parameter_of, spoken_key
 from hil.figures.card import card
 from hil.quantities import digits, percent, with_error
 
@@ -21,10 +21,13 @@ def diagnosis_card(diagnosis: Diagnosis) -> str:
     result = diagnosis.result
     rows = list[tuple[str, ...]]()
     for finding in result.findings:
-        rows.append((title(finding.effect), percent(finding.confidence), "confidence that it is there", "", ""))
-        rows += [(name, *with_error(one.value, one.std), one.unit, "") for name, one in finding.parameters.items()]
+        rows.append((named(finding), percent(finding.confidence), "confidence that it is there", "", ""))
+        rows += [
+            (parameter_of(finding.effect, name).spoken, *with_error(one.value, one.std), one.unit, "")
+            for name, one in finding.parameters.items()
+        ]
     rows += [
-        (name, *with_error(one.value, one.std), one.unit, digits(one.nominal, 4))
+        (spoken_key(name), *with_error(one.value, one.std), one.unit, digits(one.nominal, 4))
         for name, one in result.parameter_corrections.items()
     ]
     names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))

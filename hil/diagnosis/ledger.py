@@ -8,6 +8,7 @@ from hil.identification.terms import Key, Term
 
 Figures = Mapping[str, float | str]
 Answer = tuple[bool, Figures]
+SHAPE = "shape below the noise"  # name of the rule on what acts below the noise of a row
 _M = TypeVar("_M", contravariant=True)
 
 

@@ -76,7 +76,8 @@ def _stopped(searched: Searched, budget_s: float) -> str:
     others = titles(searched.not_tried) if searched.not_tried else "no mechanism"
     return (
         f"The search ended with its time budget of {digits(budget_s)} s before {searched.stopped_at}: this is the "
-        f"best explanation so far. Not fitted beside it: {others}. No next experiment was designed."
+        f"best explanation so far; --budget SECONDS (budget_s in Python) gives it more. "
+        f"Not fitted beside it: {others}. No next experiment was designed."
     )
 
 
@@ -96,7 +97,8 @@ def on_fit(final: Fit) -> list[str]:
         notes.append(
             f"{', '.join(nominal)}: not identifiable from this motion. The fit ended at the bound of the allowed "
             "range, a third or three times the value of the bench file; the value is no correction, and "
-            "bench.diagnosed.yaml has the one of the bench file."
+            "bench.diagnosed.yaml has the one of the bench file. Beside a mass that ended there it has those of the "
+            "other masses, too: their split is not told."
         )
     others = ", ".join(name.split(".")[-1] for name in final.at_bound if name not in nominal)
     if others:

@@ -25,18 +25,16 @@ from hil.diagnosis.statement import statement
 from hil.diagnosis.structure_left import Dependence
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of
 from hil.diagnosis.verdict.fit_table import closed_loop_held, fit_table
+from hil.diagnosis.verdict.in_bench import in_bench
 from hil.diagnosis.verdict.judge import unexplained_share
 from hil.diagnosis.verdict.ledgers import ledgers
 from hil.diagnosis.verdict.refit import torque_left
 from hil.diagnosis.verdict.testability import not_testable
 from hil.diagnosis.verdict.unnamed import UnnamedTerm, with_maps
-from hil.diagnosis.wording import channel_names, sentence, spoken, title, where_in_short
+from hil.diagnosis.wording import channel_names, spoken, title, where_in_short
 from hil.identification.estimator import Fit
-from hil.identification.inference import standard_errors
-from hil.identification.least_squares import SIGMAS
 from hil.identification.noise_floor import FLOOR
-from hil.identification.terms import Term
-from hil.quantities import digits, quantity, unit_of
+from hil.quantities import digits
 from hil.twin.library import BY_ID
 
 
@@ -86,25 +84,8 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
     of_plant = statement(result.model_copy(update={"verdict": judged.of_plant}))
     # settings of the controller come after what is found on the machine
     sentences = [of_plant, law.advice] if found or judged.change else [law.advice, of_plant]
-    result = result.model_copy(update={"statement": " ".join(filter(None, [*sentences, _in_bench(final)]))})
+    result = result.model_copy(update={"statement": " ".join(filter(None, [*sentences, in_bench(final, held_out)]))})
     return Reported(judged, result, _bench(judged), experiment)
-
-
-def _in_bench(final: Fit) -> str:
-    """Springs and mechanisms of the bench, as a draft has them, that these recordings tell; empty without."""
-    hypothesis = final.hypothesis
-    # a fit at the values of the bench file has no derivatives, and these values no errors
-    errors = dict(zip(hypothesis.nominal, standard_errors(final) if final.jacobian.size else (), strict=False))
-    axis, told = final.bench.axis, list[str]()
-    for name in axis.SPRINGS:
-        if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
-            told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
-    for entry in (one.active() for one in hypothesis.kept):
-        mechanism = BY_ID[entry.effect]
-        name = f"{entry.effect}.{mechanism.parameters[mechanism.strength].name}"
-        if abs(entry.values[mechanism.strength]) > SIGMAS * errors.get(name, 0.0):
-            told.append(sentence(Term(entry.effect, entry.variant, entry.values), final.bench))
-    return f"The bench has already: {' '.join(told)}" if told else ""
 
 
 def _location(judged: Judged) -> Location | None:

@@ -4,11 +4,12 @@ import math
 from collections.abc import Sequence
 
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, FitFigures, Result, Verdict
+from hil.diagnosis.improvement import improvement
+from hil.diagnosis.open_questions import cannot_show
+from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
-from hil.diagnosis.wording import spoken, title
+from hil.diagnosis.wording import listed, named, titles
 from hil.identification.least_squares import SIGMAS
-from hil.identification.noise_floor import FLOOR
 from hil.quantities import percent, quantity
 
 MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effect; the table has all
@@ -17,27 +18,32 @@ MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effe
 def statement(result: Result) -> str:
     """The verdict as one sentence."""
     if result.verdict is Verdict.MISSING_PHYSICS:
-        return f"{_found('Missing physics', result.missing)} {_residual(result)}{_left(result)}"
+        return f"{_found('Missing physics', result.missing)} {improvement(result)}{_left(result)}"
     if result.verdict is Verdict.PARAMETER_ERROR:
         sure = [item for item in result.parameter_corrections.items() if _sure(item[1])]
         worst = sorted(sure, key=lambda item: -_growth(item[1]))
         changes = ", ".join(_changed(name, one) for name, one in worst[:3])
-        if not changes:
-            return "No physics is missing, but parameters of the bench file are wrong; this motion does not tell them."
-        return f"No physics is missing; parameters of the bench file are wrong: {changes}."
+        told = f"parameters of the bench file are wrong: {changes}." if changes else _together(result.torque_left)
+        return " ".join(filter(None, (f"No physics is missing; {told}", cannot_show(result))))
     if result.verdict is Verdict.NO_MISMATCH:
-        return "The twin reproduces these recordings to within their noise."
+        told = _leaves(result.torque_left)
+        noise = f"The twin reproduces these recordings to within their noise{f' and {told}' if told else ''}."
+        return " ".join(filter(None, (noise, cannot_show(result))))
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget and not result.partial:
-        return f"The time budget ended before a mechanism was found: {_unexplained(result)}"
+        return f"The time budget ended before a mechanism was found{_unexplained(result)}"
     if result.partial:
         share = percent(1.0 - result.unexplained.share)
         return (
             f"{'The time budget ended, and no' if result.time_budget else 'No'} mechanism of the library explains the "
             f"whole mismatch. {_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
         )
-    return f"The mismatch is not explained by any mechanism of the library: {_unexplained(result)}"
+    at_floor = result.unexplained.description == AT_FLOOR
+    what = (
+        "No named physics is missing" if at_floor else "The mismatch is not explained by any mechanism of the library"
+    )
+    return f"{what}{_unexplained(result)}"
 
 
 def explained(result: Result) -> bool:
@@ -51,34 +57,20 @@ def _found(before: str, found: Sequence[Finding]) -> str:
     """What is there, in one sentence each; then what may be there, in one clause."""
     likely = [one for one in found if one.confidence >= CRITERIA.likely]
     others = [one for one in found if one not in likely and one.confidence >= MENTIONED]
-    perhaps = listed([f"{title(one.effect)} ({percent(one.confidence)})" for one in others])
+    perhaps = listed([f"{named(one)} ({percent(one.confidence)})" for one in others])
     if not likely:
         likely = [max(found, key=lambda one: one.confidence)]
-        perhaps = listed([f"{title(one.effect)} ({percent(one.confidence)})" for one in others if one not in likely])
+        perhaps = listed([f"{named(one)} ({percent(one.confidence)})" for one in others if one not in likely])
         before = f"{before}, doubtful by its confidence ({percent(likely[0].confidence)})"
-    told = f"{before}: {' '.join(one.sentence for one in likely)}"
+    told = f"{before}: {' '.join(map(_sentence, likely))}"
     return f"{told} Perhaps also {perhaps}." if perhaps else told
 
 
-def listed(texts: Sequence[str]) -> str:
-    """Join texts as a list of a sentence: "a, b and c"."""
-    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
-
-
-def _residual(result: Result) -> str:
-    """Residual before and after of the channel that improves most."""
-    name, entry = max(result.fit.items(), key=lambda item: _improvement(item[1].train))
-    found = entry.validate_ or entry.train
-    before, after, noise = (
-        quantity(value, entry.unit) for value in (found.best_before_rms, found.after_rms, found.noise_floor_rms)
-    )
-    where = "held-out" if entry.validate_ else "these"
-    what = f"With it the residual of the {spoken(name)} on {where} recordings"
-    if found.after_rms >= found.best_before_rms:
-        return f"{what} does not fall: {after} instead of {before} rms."
-    if found.after_rms**2 <= FLOOR * found.noise_floor_rms**2:
-        return f"{what} falls from {before} rms to its noise."
-    return f"{what} falls from {before} to {after} rms; its noise is {noise}."
+def _sentence(one: Finding) -> str:
+    """The sentence of a finding, with its equal rivals."""
+    if not one.equivalents:
+        return one.sentence
+    return f"{one.sentence.removesuffix('.')} (or {titles(one.equivalents)}: these recordings do not separate them)."
 
 
 def _of_axis(change: AxisChange, result: Result) -> str:
@@ -127,12 +119,34 @@ def _left(result: Result) -> str:
 
 
 def _unexplained(result: Result) -> str:
-    return f"{result.unexplained.description}{_depends(result)}"
+    """What a twin without a name for it leaves: residuals above the noise, else what is below the noise of a row."""
+    if result.unexplained.description != AT_FLOOR:
+        return f": {result.unexplained.description}{_depends(result)}"
+    if result.structure:
+        return f"; below the noise of a row, {result.structure[0].text}."
+    told = _leaves(result.torque_left)
+    return f"; every channel is within its noise{f', and the twin {told}' if told else ''}."
+
+
+def _leaves(left: TorqueLeft | None) -> str:
+    """The share of the torque that a twin leaves, and plain least squares, as a verb; empty if it is not known."""
+    if left is None or left.final is None:
+        return ""
+    return (
+        f"leaves {percent(left.final)} of the torque on held-out motion unexplained, plain least squares "
+        f"{percent(left.plain)}"
+    )
+
+
+def _together(left: TorqueLeft | None) -> str:
+    """Say of parameters that are better together, none of which is surely wrong alone."""
+    told = "its parameters fit better together as refitted, and none of them is surely wrong by itself"
+    if left is None or left.owner is None or left.final is None:
+        return f"{told}."
+    return (
+        f"{told}. The torque left on held-out motion is {percent(left.final)}, by the bench file {percent(left.owner)}."
+    )
 
 
 def _depends(result: Result) -> str:
     return f" Structure is left: {result.structure[0].text}." if result.structure else ""
-
-
-def _improvement(found: FitFigures) -> float:
-    return found.best_before_rms / max(found.after_rms, 1e-300)

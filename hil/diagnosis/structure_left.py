@@ -14,6 +14,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.wording import by_chance
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -95,11 +96,6 @@ class Dependence:
             f"{what} at a {question.name} of {digits(factor * low)} to {digits(factor * high)} {unit}{moving} "
             f"({by_chance(self.found.p)})"
         )
-
-
-def by_chance(p: float) -> str:
-    """Probability of a structure by chance, in words."""
-    return f"by chance {p:.1g}" if p > 1e-12 else "by chance less than 1e-12"
 
 
 def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:

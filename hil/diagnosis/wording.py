@@ -1,19 +1,16 @@
 """Texts for mechanisms, terms and locations."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
-from hil.diagnosis.result import Location
+from hil.diagnosis.result import Finding, Location
 from hil.diagnosis.turning import of_load, speed_unit
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
-from hil.quantities import digits, quantity, unit_of
+from hil.quantities import digits, known_quantity, quantity, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
-
-_SEEN = {"measured": "the measured torque shows it", "hidden": "the measured torque does not show it"}
-_LITTLE = 0.01  # of the largest strength of a mechanism: a harmonic below is not told by its own value
 
 
 def title(effect: str) -> str:
@@ -33,6 +30,21 @@ def spoken(channel: str) -> str:
     return title(channel.removesuffix(f"_{ending}"))
 
 
+def named(finding: Finding) -> str:
+    """Name a finding with its equal rivals: its confidence is that of the set."""
+    return " or ".join(map(title, (finding.effect, *finding.equivalents)))
+
+
+def listed(texts: Sequence[str]) -> str:
+    """Join texts as a list of a sentence: "a, b and c"."""
+    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
+
+
+def by_chance(p: float) -> str:
+    """Probability of a structure by chance, in words."""
+    return f"by chance {p:.1g}" if p > 1e-12 else "by chance less than 1e-12"
+
+
 def channel_names(bench: Bench, run: Measured) -> dict[str, str]:
     """Map channels of the twin to names of recorded channels."""
     names = AXIS_CHANNELS[run.kind]
@@ -50,15 +62,29 @@ def label(term: Term, bench: Bench) -> str:
     period_m, order = (mechanism.named(role, term.values) for role in (Role.PERIOD, Role.ORDER))
     if period_m is not None:
         return f"{title(term.effect)}, every {quantity(period_m, 'm')}"
-    which = mechanism.forms[term.variant] if order is None else _wave(order, bench)
+    which = mechanism.forms[term.variant] if order is None else wave(order, bench)
     return f"{title(term.effect)}, {which}"
 
 
-def _wave(order: float, bench: Bench) -> str:
+def wave(order: float, bench: Bench, error: float = 0.0) -> str:
     """How often an effect repeats: per revolution, or along the travel where no revolution is known."""
     if bench.axis.physics().turn_known:
-        return f"{digits(order)} times per revolution"
-    return f"every {quantity(1.0 / order, 'm')} of travel"
+        return f"{known_quantity(order, error, '1/rev')} times per revolution"
+    return f"every {known_quantity(1.0 / order, error / order**2, 'm')} of travel"
+
+
+def spoken_key(key: str) -> str:
+    """A key of corrections in words: "constant_load.load_torque_n_m" -> "constant load: load torque".
+
+    That of an axis stays as the bench file has it.
+    """
+    effect, _, name = key.rpartition(".")
+    return f"{title(effect)}: {parameter_of(effect, name).spoken}" if effect in BY_ID else key
+
+
+def parameter_of(effect: str, name: str) -> Parameter:
+    """The parameter of a mechanism by its name."""
+    return next(one for one in BY_ID[effect].parameters if one.name == name)
 
 
 def unit_in(bench: Bench, parameter: Parameter) -> str:
@@ -68,40 +94,14 @@ def unit_in(bench: Bench, parameter: Parameter) -> str:
     return parameter.dimension.unit(bench.axis.drive_unit, bench.axis.turns)
 
 
-def value_in_words(value: float, parameter: Parameter, bench: Bench) -> str:
-    """Value of a parameter with its unit; edges of windows to a hundredth of a second, early and late ones alike."""
-    return f"{value:.2f} s" if parameter.role is Role.EDGE else quantity(value, unit_in(bench, parameter))
+def value_in_words(value: float, parameter: Parameter, bench: Bench, error: float = 0.0) -> str:
+    """Value of a parameter with its unit, rounded by its standard error where this is given.
 
-
-def sentence(term: Term, bench: Bench) -> str:
-    """Describe a term in a sentence with its values, and its variant in brackets."""
-    mechanism, axis = BY_ID[term.effect], bench.axis
-    variant = mechanism.variants[term.variant]
-    # forms of a transmission are forces, which a rigid axis does not have
-    forms = bool(axis.SPRINGS) or not mechanism.in_transmission
-    told_by = variant.text if variant.text and forms else mechanism.text
-    text, opposite = told_by.sentence, told_by.reversed
-    given = list(term.values)
-    if given[mechanism.strength] < 0.0 and opposite:
-        text, given[mechanism.strength] = opposite, -given[mechanism.strength]
-    values = {}
-    least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
-    for parameter, value in zip(mechanism.parameters, given, strict=True):
-        little = parameter.role is Role.STRENGTH and abs(value) < least
-        told = value_in_words(least if little else value, parameter, bench)
-        values[parameter.name] = f"less than {told}" if little else told
-    order = mechanism.named(Role.ORDER, term.values)
-    values["wave"] = "" if order is None else _wave(order, bench)
-    values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
-    told = of_load(text, axis.turns).format(**values, variant=variant.name)
-    if not variant.name or not forms or "{variant}" in text or variant.name in told:
-        return told
-    return f"{told.removesuffix('.')} ({_variant_in_words(variant.name)})."
-
-
-def _variant_in_words(variant: str) -> str:
-    """The name of a variant, with what it says of the measured torque in words."""
-    return "; ".join(_SEEN.get(word, word) for word in variant.split()) if variant.split()[0] in _SEEN else variant
+    Edges of windows are told to a hundredth of a second, early and late ones alike.
+    """
+    if parameter.role is Role.EDGE:
+        return f"{value:.2f} s"
+    return known_quantity(value, error, unit_in(bench, parameter))
 
 
 def where(location: Location, turns: bool) -> dict[str, str]:

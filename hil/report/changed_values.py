@@ -6,6 +6,7 @@ from hil.bench.bench_file import Bench
 from hil.bench.control_section import UNKNOWN, UnknownControl
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.value import Correction
+from hil.diagnosis.verdict.findings import not_split
 from hil.errors import FieldPath
 from hil.files.yaml_edit import YamlChange
 from hil.identification.coordinates import DELAY, known_coordinates, known_values
@@ -16,7 +17,7 @@ from hil.quantities import digits, rounded_to_error, unit_of
 def changed_values(diagnosis: Diagnosis, given: Bench) -> list[YamlChange]:
     """Changes of axis, control law and the bench's own mechanisms.
 
-    A value at a bound is no correction: the one of the bench stays, with the reason.
+    A value at a bound is no correction, nor is a mass beside one: the one of the bench stays, with the reason.
     """
     found = [] if diagnosis.reported.judged.keeps_bench else _fitted(diagnosis, given)
     told = diagnosis.result.parameter_corrections
@@ -47,6 +48,9 @@ def _fitted(diagnosis: Diagnosis, given: Bench) -> list[YamlChange]:
             continue
         if name in diagnosis.result.not_identifiable:
             why = f"not identifiable: the fit ended at {digits(after)}, the bound of its range, which is no correction"
+            found.append(YamlChange(paths[name], None, why))
+        elif name in not_split(given, diagnosis.result.not_identifiable):
+            why = f"the split of the masses is not told: the fit has {digits(after)} beside another one at its bound"
             found.append(YamlChange(paths[name], None, why))
         else:
             found.append(_change(paths[name], before, after, told.get(name), error))

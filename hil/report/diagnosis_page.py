@@ -5,11 +5,12 @@ from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.experiment import NEXT_EXPERIMENT
+from hil.diagnosis.open_questions import no_experiment
 from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
 from hil.diagnosis.pictures.structure import structure_figure
 from hil.diagnosis.preparation.split import whole_name
-from hil.diagnosis.result import Result, Verdict
+from hil.diagnosis.result import AT_FLOOR, Verdict
 from hil.diagnosis.statement import explained
 from hil.diagnosis.wording import titles, where
 from hil.figures.drawing import save
@@ -19,12 +20,16 @@ from hil.report.fit_section import corrections_section, fit_section
 from hil.report.ledger_report import ledger_section
 from hil.report.page import Page
 
+LEGEND = (
+    "Colour of the bar: green, all of the mismatch is explained; orange, something is left, doubtful or not searched."
+)
+
 
 def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> None:
     """Write report.html with its PNGs."""
     result = diagnosis.result
     names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))
-    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result))
+    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result), LEGEND)
     findings_section(page, diagnosis, folder)
     _change(page, diagnosis, folder)
     if result.location is not None:
@@ -44,7 +49,7 @@ def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> No
     corrections_section(page, result)
     page.heading("What remains unexplained")
     page.text(result.unexplained.description)
-    if result.unexplained.share > 0.0:
+    if result.unexplained.share > 0.0 and result.unexplained.description != AT_FLOOR:
         page.text(f"Unexplained: {percent(result.unexplained.share)} of the energy above the noise.")
     page.items([f"{one.text[:1].upper()}{one.text[1:]}." for one in result.structure])
     _structure(page, diagnosis, folder)
@@ -116,14 +121,8 @@ def _change(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
 def _next_experiment(page: Page, diagnosis: Diagnosis) -> None:
     experiment, result = diagnosis.experiment, diagnosis.result
     page.heading("Next experiment")
-    page.text(experiment.note if experiment else _no_experiment(result))
+    page.text(experiment.note if experiment else no_experiment(result))
     if experiment and experiment.profile:
         page.text(
             f"{NEXT_EXPERIMENT} is its profile: run it and diagnose all recordings together; hil investigate does both."
         )
-
-
-def _no_experiment(result: Result) -> str:
-    if result.verdict is Verdict.UNEXPLAINED:
-        return "None was designed: that needs a known control law, and a twin that holds its closed loop."
-    return "No question is open that another motion could answer."

@@ -9,9 +9,10 @@ from hil.diagnosis.result import Finding
 from hil.diagnosis.statement import MENTIONED
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.value import Value
-from hil.diagnosis.wording import label, title, titles
+from hil.diagnosis.wording import label, parameter_of, title, titles
 from hil.figures.drawing import save
-from hil.quantities import percent, reading_unit, with_error
+from hil.identification.terms import Term
+from hil.quantities import digits, percent, reading_unit, with_error
 from hil.report.page import Page
 from hil.twin.library import BY_ID
 
@@ -29,6 +30,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     finding, term = diagnosis.result.findings[index], diagnosis.term_of(index)
     mechanism = BY_ID[finding.effect]
     name = label(term, diagnosis.given_bench)
+    name += "".join(f" or {title(one)}" for one in finding.equivalents)
     name = f"Explains a part: {name}" if diagnosis.result.partial else f"{name[:1].upper()}{name[1:]}"
     turns = diagnosis.given_bench.axis.turns
     page.heading(f"{index + 1}. {name}: {of_load(mechanism.element_of(term.variant), turns)}")
@@ -36,13 +38,20 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     again = f"_{term.slot + 1}" if term.slot else ""
     page.picture(save(figure, folder / f"{term.effect}{again}.png"), of_load(caption, turns))
     sure = f"{100.0 * finding.confidence:.0f} %" if finding.confidence < 0.99 else "above 99 %"
-    page.text(f"{finding.sentence} Confidence {sure}: {finding.needed}.")
+    of_set = " (that one of them is there)" if finding.equivalents else ""
+    page.text(f"{finding.sentence} Confidence {sure}{of_set}: {finding.needed}.")
     page.text(f"{mechanism.equation} ({mechanism.source})")
     if finding.form:
         page.text(f"Reported as part of this curve, because it corrects the curve's form only slightly: {finding.form}")
     page.table(
         ("parameter", "value", "standard error", "unit"),
-        [(name, *_cells(entry, scaled=not finding.windows)) for name, entry in finding.parameters.items()],
+        [
+            (
+                parameter_of(finding.effect, name).spoken,
+                *_cells(entry, not finding.windows, name in _at_bound(diagnosis, term)),
+            )
+            for name, entry in finding.parameters.items()
+        ],
         left=(0, 3),
     )
     if len(finding.windows) > 1:
@@ -77,7 +86,16 @@ def _windows(finding: Finding) -> list[tuple[str, ...]]:
     ]
 
 
-def _cells(entry: Value, scaled: bool = True) -> tuple[str, ...]:
+def _at_bound(diagnosis: Diagnosis, term: Term) -> set[str]:
+    """Parameters of a term that ended at the bound of their range."""
+    final = diagnosis.final
+    at = next(index for index, one in enumerate(final.terms) if one is term)
+    return {name.partition(".")[2] for name in final.at_bound if name.startswith(f"{at}.")}
+
+
+def _cells(entry: Value, scaled: bool = True, at_bound: bool = False) -> tuple[str, ...]:
     """Cells of a value, its standard error, and the unit in which both are shown: the SI unit if not `scaled`."""
     factor, unit = reading_unit(entry.unit, entry.value) if scaled else (1.0, entry.unit)
+    if at_bound:
+        return digits(entry.value * factor), "at its bound", unit
     return *with_error(entry.value * factor, entry.std * factor), unit

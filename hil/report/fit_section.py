@@ -5,7 +5,7 @@ from pathlib import Path
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.location import residual_panels
 from hil.diagnosis.result import FitFigures, Result
-from hil.diagnosis.wording import label, spoken, title
+from hil.diagnosis.wording import label, spoken, spoken_key, title
 from hil.figures.drawing import save
 from hil.quantities import digits, quantity, reading_unit
 from hil.report import plots
@@ -77,7 +77,7 @@ def corrections_section(page: Page, result: Result) -> None:
     for name, one in result.parameter_corrections.items():
         factor, unit = reading_unit(one.unit, max(abs(one.nominal), abs(one.value)))
         values = (factor * value for value in (one.nominal, one.value, one.std))
-        rows.append((name, unit, *fitted_cells(*values)))
+        rows.append((spoken_key(name), unit, *fitted_cells(*values)))
     if not rows and not result.not_identifiable:
         return
     page.heading("Parameters of the bench")

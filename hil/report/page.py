@@ -15,10 +15,13 @@ _TEMPLATE = Path(__file__).with_name("page.html.j2")
 
 
 class Page:
-    """Parts of a page in the order in which they are added; `write` renders the template page.html.j2."""
+    """Parts of a page in the order in which they are added; `write` renders the template page.html.j2.
 
-    def __init__(self, title: str, lead: str, verdict: str, good: bool) -> None:
-        self.title, self.lead, self.verdict, self.good = title, lead, verdict, good
+    `legend` says what the colour of the verdict means.
+    """
+
+    def __init__(self, title: str, lead: str, verdict: str, good: bool, legend: str = "") -> None:
+        self.title, self.lead, self.verdict, self.good, self.legend = title, lead, verdict, good, legend
         self._parts: list[tuple[str, Any]] = []
         self._plots: list[Any] = []
 
@@ -72,6 +75,7 @@ class Page:
             lead=self.lead,
             verdict=self.verdict,
             good=self.good,
+            legend=self.legend,
             parts=self._parts,
             head=Markup(head),  # Bokeh's own HTML
             divisions=[Markup(division) for division in divisions],

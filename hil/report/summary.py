@@ -1,8 +1,8 @@
 """Summary of a diagnosis on the terminal."""
 
 from hil.diagnosis.result import Result, TorqueLeft
-from hil.diagnosis.wording import spoken, title
-from hil.quantities import percent, quantity
+from hil.diagnosis.wording import named, spoken
+from hil.quantities import digits, percent, quantity
 from hil.report.console import out, table
 
 
@@ -23,13 +23,15 @@ def print_diagnosis(result: Result) -> None:
     table(("rms, held out" if held_out else "rms", "before", "after", "noise floor"), rows)
     if result.time_budget:
         out.print(
-            f"\nThe search ended with its time budget before {result.time_budget.stopped_before}: best answer so far."
+            f"\nThe search ended with its time budget of {digits(result.time_budget.budget_s)} s before "
+            f"{result.time_budget.stopped_before}: best answer so far. To go on, call it with --budget SECONDS, more "
+            "than these."
         )
     if result.findings:
         out.print()
         table(
             ("found", "confidence that it is there"),
-            [(title(finding.effect), percent(finding.confidence)) for finding in result.findings],
+            [(named(finding), percent(finding.confidence)) for finding in result.findings],
         )
     if result.torque_left:
         out.print(f"\n{torque_line(result.torque_left)}")

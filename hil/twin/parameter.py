@@ -50,6 +50,9 @@ _TURNING_UNITS = {
 }
 
 
+_IN_NAMES = str.maketrans({"^": None, "/": "_", " ": "_"})
+
+
 class Role(StrEnum):
     """Role of a parameter in a search."""
 
@@ -77,6 +80,13 @@ class Parameter:
     default: float | None = None
     role: Role = Role.SHAPE
     scale: float | None = None
+
+    @property
+    def spoken(self) -> str:
+        """The name in words without its unit, which is another one on a linear axis or of a load that turns."""
+        ending = self.dimension.value.lower().replace("(n m)^2", "n2 m2").translate(_IN_NAMES)
+        ending = {Dimension.COUNT: "per_rev", Dimension.RATIO: "m_m"}.get(self.dimension, ending)
+        return self.name.removesuffix(f"_{ending}").replace("_", " ")
 
 
 def default_starts(parameter: Parameter, scene: Scene) -> list[float]:

@@ -30,10 +30,12 @@ def location_figure(diagnosis: Diagnosis) -> Drawing:
     before = shown_in(reference_fit(diagnosis), diagnosis.held_out)
     seen = mismatch_energies(before, diagnosis.final)
     figure = Drawing(WIDTH_IN, 8.2)
-    axes = figure.subplot_mosaic([["block", "phase"], ["position", "speed"], ["time", "time"]])
     names = channel_names(diagnosis.given_bench, diagnosis.train.runs[0])
     blocks = {spoken(names[name]): share for name, share in block_shares(before).items()}
-    _shares(axes["block"], blocks, "Channel that shows it")
+    first = "block" if any(blocks.values()) else "phase"  # no channel shows what is below the noise of a row
+    axes = figure.subplot_mosaic([[first, "phase"], ["position", "speed"], ["time", "time"]])
+    if first == "block":
+        _shares(axes["block"], blocks, "Channel that shows it")
     _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
     excess = np.concatenate([energy.rows for energy in seen])
     position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])

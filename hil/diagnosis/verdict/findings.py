@@ -15,13 +15,14 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Finding, Rival
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
+from hil.diagnosis.sentence import TermErrors, sentence
 from hil.diagnosis.stages import Searched
 from hil.diagnosis.value import Correction, Value
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
-from hil.diagnosis.verdict.strength import strength_over_error
-from hil.diagnosis.wording import sentence, title, unit_in
+from hil.diagnosis.verdict.strength import strength_errors, strength_over_error
+from hil.diagnosis.wording import title, unit_in
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -90,9 +91,13 @@ def findings(
                     parameters=event.parameters if event else _values(term, errors, bench),
                     windows=event.windows if event else (),
                     train=event.train if event else None,
-                    sentence=event.sentence if event else sentence(_normal(term), bench),
+                    sentence=event.sentence
+                    if event
+                    else sentence(_normal(term), bench, _errors(final, index, deviations)),
                     form=" ".join(
-                        sentence(_normal(terms[other]), bench) for other, law in forms.items() if law == index
+                        sentence(_normal(terms[other]), bench, _errors(final, other, deviations))
+                        for other, law in forms.items()
+                        if law == index
                     ),
                     needed=_needed(ablation),
                 ),
@@ -105,8 +110,8 @@ def corrections(bench_file: Bench, fit: Fit) -> dict[str, Correction]:
     """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
 
     Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
-    bound of the allowed range, or was left as it is, has no correction. Values of the
-    bench's mechanisms are among them.
+    bound of the allowed range, or was left as it is, has no correction, and no mass beside one that did (`not_split`).
+    Values of the bench's mechanisms are among them.
     """
     hypothesis = fit.hypothesis
     told = hypothesis.nominal if fit.data.observability.torque_measured else RATIOS
@@ -122,10 +127,16 @@ def corrections(bench_file: Bench, fit: Fit) -> dict[str, Correction]:
         )
         for before, one, value, std in entries
         if one.name in told
-        and one.name not in (*fit.at_bound, DELAY)
+        and one.name not in (*fit.at_bound, *not_split(bench_file, fit.at_bound), DELAY)
         and not math.isclose(value, before)
         and (before or value > CRITERIA.sigmas * std)
     }
+
+
+def not_split(bench: Bench, at_bound: Sequence[str]) -> tuple[str, ...]:
+    """Masses of the axis if one of them ended at its bound: their sum is told, and no single one."""
+    masses = bench.axis.MASSES
+    return masses if set(masses) & set(at_bound) else ()
 
 
 def diagnosed_bench(bench_file: Bench, fit: Fit) -> Bench:
@@ -161,6 +172,12 @@ def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Valu
         parameter.name: Value(value=value, std=error, unit=unit_in(bench, parameter))
         for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors, strict=True)
     }
+
+
+def _errors(fit: Fit, index: int, deviations: Sequence[float]) -> TermErrors:
+    """Errors of a term, of those of all values of a fit."""
+    strength = BY_ID[fit.terms[index].effect].strength
+    return TermErrors(deviations[fit.hypothesis.columns(index)], strength_errors(fit, index)[strength])
 
 
 def _sure(fit: Fit, index: int) -> float:
@@ -226,7 +243,7 @@ def _stuck(rival: RivalFit) -> str:
     parameters = BY_ID[rival.terms[-1].effect].parameters
     at = rival.terms[-1].values
     stuck = [
-        parameter.name
+        parameter.spoken
         for parameter, value in zip(parameters, at, strict=True)
         if parameter.dimension is not Dimension.ANGLE and value in (parameter.low, parameter.high)
     ]

@@ -1,4 +1,4 @@
-"""Constant load, such as a weight that the motor has to hold.
+"""Constant load: a weight that the motor has to hold, a preload, or an offset of the torque channel.
 
 A positive load pulls the axis in the negative direction: it takes a positive motor torque to hold it.
 """
@@ -24,7 +24,7 @@ MECHANISM = Mechanism(
     parameters=(Parameter("load_torque_n_m", Dimension.TORQUE, -1e4, 1e4, role=Role.STRENGTH),),
     variants=(Variant(Stage.MOTOR_TORQUE, _load),),
     text=Text(
-        "A constant load of {load_torque_n_m}, such as a weight, acts on the axis, also at standstill.",
+        "A constant load of {load_torque_n_m}: a weight, a preload, or an offset of the torque channel.",
         Picture.FRICTION,
     ),
     search=SearchHints(typical=lambda a: (0.1 * a.friction,)),

@@ -31,6 +31,7 @@ MECHANISM = Mechanism(
     text=Text(
         "Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}.",
         Picture.FRICTION_OVER_TIME,
+        rate="Friction changes by a share of {rate} per minute while it is recorded; where it ends is not told.",
     ),
     search=SearchHints(lambda s: [(0.05, f * s.duration_s) for f in (0.2, 1.0, 5.0)], lambda a: (0.2, 600.0)),
 )

@@ -40,6 +40,7 @@ MECHANISM = Mechanism(
     text=Text(
         "The screw grows by {relative_growth} of its length as it warms up, within about {time_constant_s}.",
         Picture.GROWTH,
+        rate="The screw grows by {rate} of its length per minute while it is recorded; where it ends is not told.",
     ),
     search=SearchHints(
         lambda s: [(1e-6 / s.travel_m, f * s.duration_s) for f in (0.2, 1.0, 5.0)],

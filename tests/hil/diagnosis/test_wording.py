@@ -5,9 +5,10 @@ from example_result import EXAMPLE
 
 from hil.bench.bench_file import load_bench
 from hil.diagnosis.result import AT_FLOOR, Location, Result
+from hil.diagnosis.sentence import sentence
 from hil.diagnosis.statement import explained, statement
 from hil.diagnosis.turning import of_load
-from hil.diagnosis.wording import sentence, spoken, where
+from hil.diagnosis.wording import spoken, where
 from hil.identification.terms import Term
 from hil.twin.library import LIBRARY
 
@@ -88,12 +89,15 @@ def test_a_change_is_a_share_only_where_a_ratio_says_something(
     nominal: float, value: float, unit: str, said: str
 ) -> None:
     correction = {"nominal": nominal, "value": value, "std": 1e-6, "unit": unit}
-    result = Result.model_validate(EXAMPLE | {"verdict": "parameter_error", "parameter_corrections": {"x": correction}})
+    result = Result.model_validate(
+        {**EXAMPLE, "verdict": "parameter_error", "parameter_corrections": {"x": correction}, "not_testable": ()}
+    )
     assert statement(result) == f"No physics is missing; parameters of the bench file are wrong: {said}."
 
 
 def finding(effect: str, confidence: float, sentence: str) -> dict[str, object]:
-    return EXAMPLE["missing"][0] | {"effect": effect, "confidence": confidence, "sentence": sentence}
+    found = {"effect": effect, "confidence": confidence, "sentence": sentence, "equivalents": ()}
+    return EXAMPLE["missing"][0] | found
 
 
 FLOOR = {"description": AT_FLOOR, "share": 0.0}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from diagnosis_runs import bench
 
-from hil.diagnosis.wording import label, sentence
+from hil.diagnosis.sentence import sentence
+from hil.diagnosis.wording import label
 from hil.identification.terms import Term, compatible, repeats
 
 SIX, FIFTEEN = Term("cogging_torque", 0, (0.2, 6.0, 0.5)), Term("cogging_torque", 0, (0.15, 15.0, -1.0), slot=1)

@@ -126,6 +126,8 @@ def test_a_parameter_at_its_bound_stays_as_it_was(found: Diagnosis, tmp_path: Pa
     assert line(text, "table_mass_kg").split("#")[0].strip() == "table_mass_kg: 384.0"
     assert "not identifiable: the fit ended at 4" in line(text, "table_mass_kg")
     assert again.axis.model_dump()["table_mass_kg"] == 384.0
+    assert again.axis.model_dump()["motor_mass_kg"] == OWNER.axis.model_dump()["motor_mass_kg"]
+    assert "the split of the masses is not told" in line(text, "motor_mass_kg")
 
 
 def test_the_simulated_axis_stays_the_same_machine(found: Diagnosis, tmp_path: Path) -> None:

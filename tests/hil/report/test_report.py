@@ -170,6 +170,14 @@ def test_long_recordings_stay_light(tmp_path: Path) -> None:
     assert (tmp_path / "page.html").stat().st_size < 8e6
 
 
+@pytest.mark.parametrize("legend", ["", "Bar: green is good."])
+def test_a_legend_stands_below_the_verdict(legend: str, tmp_path: Path) -> None:
+    Page("t", "l", "It is so.", True, legend).write(tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    shown = re.findall(r'<div class="verdict good">It is so.</div>\s*<p class="lead">(.*?)</p>', page)
+    assert shown == [legend][: len(legend)]
+
+
 def test_text_is_escaped(tmp_path: Path) -> None:
     page = Page("<b>", "a & b", "<script>alert(1)</script>", False)
     page.table(("<i>",), [("1 < 2",)], left=())

@@ -15,6 +15,8 @@ from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis import stages
 from hil.diagnosis.diagnosis import Diagnosis
+from hil.diagnosis.location.locate import block_shares
+from hil.diagnosis.pictures import location
 from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.pictures.laws import LAWS
 from hil.diagnosis.pictures.view import around, view_of
@@ -215,3 +217,12 @@ def test_the_location_shows_shares_that_add_up_and_densities_with_units() -> Non
     assert speed.get_xlabel().startswith("speed of the table [")
     assert time.get_xlabel() == "time [s]"
     assert "[" in set_point.get_ylabel()
+
+
+def test_a_panel_of_channels_that_show_nothing_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Below the noise of a row no channel has energy."""
+    diagnosis = diagnosis_of("stribeck_friction")
+    monkeypatch.setattr(location, "block_shares", lambda fit: dict.fromkeys(block_shares(fit), 0.0))
+    titles = [axis.get_title("left") for axis in diagnosis.plot("location").axes]
+    assert "Channel that shows it" not in titles
+    assert "Phase of motion" in titles

@@ -1,0 +1,49 @@
+"""What the bench has already, as a draft has it, of what recordings tell."""
+
+import numpy as np
+
+from hil.bench.bench_file import MechanismEntry
+from hil.diagnosis.sentence import TermErrors, sentence
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.inference import standard_errors
+from hil.identification.least_squares import SIGMAS
+from hil.identification.terms import Term
+from hil.identification.torque_left import fit_plain, left_by_twin
+from hil.quantities import quantity, unit_of
+from hil.twin.library import BY_ID
+
+
+def in_bench(final: Fit, held_out: Dataset) -> str:
+    """Springs and mechanisms of the bench that are above their errors and matter; empty without."""
+    hypothesis = final.hypothesis
+    # a fit at the values of the bench file has no derivatives, and these values no errors
+    errors = dict(zip(hypothesis.nominal, standard_errors(final) if final.jacobian.size else (), strict=False))
+    axis, told = final.bench.axis, list[str]()
+    for name in axis.SPRINGS:
+        if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
+            told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
+    for kept in hypothesis.kept:
+        entry, mechanism = kept.active(), BY_ID[kept.effect]
+        known = [errors.get(f"{entry.effect}.{one.name}", 0.0) for one in mechanism.parameters]
+        clear = abs(entry.values[mechanism.strength]) > SIGMAS * known[mechanism.strength]
+        if clear and matters(final, kept, held_out if held_out.runs else final.data):
+            term = Term(entry.effect, entry.variant, entry.values)
+            told.append(sentence(term, final.bench, TermErrors(known, known[mechanism.strength])))
+    return f"The bench has already: {' '.join(told)}" if told else ""
+
+
+def matters(fit: Fit, entry: MechanismEntry, data: Dataset) -> bool:
+    """True if a mechanism of the bench takes more of the torque than the twin leaves, in mean square on a data set.
+
+    True where this cannot be told.
+    """
+    plain = fit_plain(fit.data) if data.observability.torque_measured else None
+    if plain is None:
+        return True
+    bench, terms = fit.hypothesis.resolved
+    others = tuple(one for one in bench.mechanisms if one is not entry)
+    bare = Hypothesis(bench.model_copy(update={"mechanisms": others}), terms)
+    left, without = (left_by_twin(one, data, plain) for one in (fit.hypothesis, bare))
+    return left is None or without is None or without**2 - left**2 > left**2

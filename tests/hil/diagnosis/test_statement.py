@@ -1,0 +1,70 @@
+"""The verdict as one sentence, where nothing is named."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from example_result import EXAMPLE
+
+from hil.diagnosis.result import AT_FLOOR, Result
+from hil.diagnosis.statement import statement
+from hil.twin.library import LIBRARY
+
+TORQUE = {"owner": 0.0587, "refitted": 0.0569, "final": 0.0587, "plain": 0.0586}
+TIME = {
+    "channel": "torque",
+    "over": "time",
+    "share": 0.07,
+    "by_chance": 7e-4,
+    "text": "the axis needs 2.94 mN m more torque than the twin at a time of 4.80 to 9.53 s (by chance 0.0007)",
+}
+NOTHING = EXAMPLE | {"missing": (), "parameter_corrections": {}, "unexplained": {"description": AT_FLOOR, "share": 0.0}}
+
+
+def said(**changes: Any) -> str:
+    return statement(Result.model_validate(NOTHING | changes))
+
+
+def test_an_all_clear_says_what_is_left_and_what_the_motion_cannot_show() -> None:
+    assert said(verdict="no_mismatch", torque_left=TORQUE) == (
+        "The twin reproduces these recordings to within their noise and leaves 5.87 % of the torque on held-out motion "
+        f"unexplained, plain least squares 5.86 %. This motion cannot show 1 of {len(LIBRARY)} mechanisms, such as "
+        "thermal growth."
+    )
+    assert said(verdict="no_mismatch", not_testable=()) == (
+        "The twin reproduces these recordings to within their noise."
+    )
+
+
+def test_what_is_below_the_noise_of_a_row_is_no_mismatch_above_it() -> None:
+    told = said(verdict="unexplained", structure=(TIME,))
+    assert told == f"No named physics is missing; below the noise of a row, {TIME['text']}."
+
+
+def test_without_a_structure_the_torque_tells_why_it_is_not_explained() -> None:
+    told = said(verdict="unexplained", torque_left=TORQUE)
+    assert told.startswith("No named physics is missing; every channel is within its noise, and the twin leaves 5.87 %")
+    assert said(verdict="unexplained").endswith("every channel is within its noise.")
+
+
+def test_residuals_above_the_noise_are_a_mismatch() -> None:
+    left = {"description": "Residuals above the noise (rms): torque 3.00 times.", "share": 0.5}
+    told = said(verdict="unexplained", unexplained=left, structure=(TIME,))
+    assert told.startswith("The mismatch is not explained by any mechanism of the library: Residuals above the noise")
+    assert f"Structure is left: {TIME['text']}." in told
+
+
+def test_a_search_that_ended_says_what_is_below_the_noise() -> None:
+    budget = {"budget_s": 10.0, "stopped_before": "fitting", "not_tried": ()}
+    told = said(verdict="unexplained", structure=(TIME,), time_budget=budget)
+    assert told == f"The time budget ended before a mechanism was found; below the noise of a row, {TIME['text']}."
+
+
+def test_parameters_that_are_only_better_together_are_told_by_the_torque() -> None:
+    within = {"x": {"nominal": 1.0, "value": 1.01, "std": 0.01, "unit": "kg"}}
+    told = said(verdict="parameter_error", parameter_corrections=within, torque_left=TORQUE | {"final": 0.0132})
+    assert (
+        "none of them is surely wrong by itself. The torque left on held-out motion is 1.32 %, by the bench file"
+        in told
+    )
+    assert "This motion cannot show 1 of" in told

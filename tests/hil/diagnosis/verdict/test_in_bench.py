@@ -1,0 +1,32 @@
+"""What the bench has already is told where it matters: beside what the twin leaves of the torque."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_runs import bench, dataset, evaluated, recorded
+
+from hil.bench.bench_file import Bench, MechanismEntry
+from hil.diagnosis.verdict.in_bench import in_bench, matters
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
+from hil.identification.terms import Term
+
+
+def with_load(load_n_m: float) -> Bench:
+    entry = MechanismEntry(effect="constant_load", parameters={"load_torque_n_m": load_n_m})
+    return bench().model_copy(update={"mechanisms": (entry,)})
+
+
+@pytest.mark.parametrize(("load_n_m", "told"), [(0.5, True), (1e-4, False)])
+def test_a_load_is_told_if_it_is_more_than_the_torque_left(load_n_m: float, told: bool) -> None:
+    """Recordings with a cogging that the twin lacks: a load far below it says nothing of them."""
+    owner = with_load(load_n_m)
+    seen = (Term("constant_load", 0, (load_n_m,)), Term("cogging_torque", 0, (0.05, 12.0, 0.0)))
+    run = take(recorded(bench(), *seen), owner)
+    data = dataset([run], owner)
+    fit = evaluated(Hypothesis(owner), data)
+    (entry,) = fit.hypothesis.kept
+    assert matters(fit, entry, data) is told
+    said = in_bench(fit, dataset([run], owner))
+    assert ("A constant load of 0.500 N m: a weight, a preload, or an offset" in said) is told
+    assert "such as a weight" not in said

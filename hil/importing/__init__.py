@@ -12,7 +12,7 @@ file to table        row_groups, foreign_table (all columns)                    
                      foreign_columns (those that a map names)                    `Foreign`
 words                lexicon(.yaml), units, column_names, unit_lines,            `Label`, `HeaderValue`
                      header_values, stated
-clock                stamp_columns, clock; hil.recording.stamps and row_clock    `StampClock`, `RegularRows`
+clock                stamp_columns, row_counters, clock; hil.recording.stamps and row_clock    `StampClock`, `RegularRows`
                      channel_clocks (stamps of each channel)                     `OwnClocks`
 values that hold     on_change                                                   columns without empty cells
 rows                 wraps, held_samples, spikes, slow_gaps, rows                `KeptRows`

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_part, unit_of_text, whole_unit
+from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_part, unit_of_text, unit_within, whole_unit
 from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
@@ -63,6 +63,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]
     found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
     quantity, letter = next((one for one in found if one != _NOTHING), _NOTHING)
+    if unit is None and not odd and not letter and quantity is not Quantity.UNKNOWN:
+        unit = unit_within(name, quantity)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
     if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):

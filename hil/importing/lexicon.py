@@ -97,10 +97,11 @@ class _Entry(BaseModel):
 
 
 class ConstantWords(_Entry):
-    """Regular expression of the words of a constant, and factors of its units to SI."""
+    """Regular expressions of the words of a constant, and factors of its units to SI; `alone` is a whole statement."""
 
     words: Annotated[str, BeforeValidator(_pattern)]
     units: dict[str, PositiveFloat]
+    alone: Annotated[str, BeforeValidator(_pattern)] = "(?!)"
 
 
 class ScalarNames(_Entry):
@@ -146,6 +147,7 @@ class Lexicon(_Entry):
     joints: Words
     scalars: ScalarNames
     series: SeriesWords
+    enumerated: Words
     missing: Words
     infinite: Words
     rows: dict[RowKind, Annotated[str, BeforeValidator(_pattern)]]

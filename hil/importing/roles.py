@@ -1,7 +1,7 @@
 """Assign columns to roles (motor, table, set-points, torque): by their names, else by relations between the columns."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from hil.importing.effort_roles import EXPLAINED, better_speed, choose_efforts
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.monitor_outputs import monitor_outputs
 from hil.importing.one_axis import one_axis
+from hil.importing.row_counters import COUNTER, rises_evenly
 from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, driven, proportional
 from hil.importing.unnamed_columns import quantities_by_relations
 
@@ -73,6 +74,9 @@ def find_roles(
     roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
     labels = {name: label for name, label in labels.items() if name not in frozen}
     live = {name: columns[name] for name in columns if name in labels}
+    counters = [name for name in live if labels[name].quantity is not Quantity.TIME and rises_evenly(live[name])]
+    roles.left_out |= dict.fromkeys(counters, COUNTER)
+    labels |= {name: replace(labels[name], quantity=Quantity.OTHER) for name in counters}
     labels, roles.how = quantities_by_relations(live, labels, period_s)
     roles.unsure += [f"{name}: its name says nothing; {how}" for name, how in roles.how.items()]
     if outputs := monitor_outputs(live, labels, period_s):

@@ -5,7 +5,8 @@ HilError          1   something went wrong that the user can act on
 ├── StoppedByUser 130 ctrl-C or a signal before anything moved
 └── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
     ├── FieldError    the same, at one field of a model whose file is known to the caller only
-    └── RateNeeded    a file without times; the command that reads it takes its rate
+    ├── RateNeeded    a file without times; the command that reads it takes its rate
+    └── PartOfAxis    a file without the position or the torque of the axis; another one may have it
 """
 
 from collections.abc import Iterable
@@ -61,6 +62,14 @@ class RateNeeded(InputError):
 
     def __init__(self, problem: str, command: str = "hil import FILE") -> None:
         super().__init__(f"{problem}; say the rate of the rows: {command} --rate HZ")
+        self.problem = problem
+
+
+class PartOfAxis(InputError):
+    """A file lacks the position or the torque of the axis, which another file of the same run may have."""
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(f"{problem}; or, if another file of the same run has it, join the two by time into one file")
         self.problem = problem
 
 

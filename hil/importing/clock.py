@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError, RateNeeded
+from hil.errors import RateNeeded
 from hil.importing.column_names import Label, label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Constant, Quantity, lexicon
@@ -182,7 +182,7 @@ def _plausible(rate_hz: float) -> bool:
 
 
 def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
-    """Rate [Hz] that the file gives beside its columns, with its source: a line or a text with a unit, else a scalar."""
+    """Rate [Hz] that the file gives beside its columns, with its source: a line or a scalar."""
     told = table.constants.get(Constant.RATE)
     if told and _plausible(told.value):
         return told.value, f"period from the line {told.text!r}"

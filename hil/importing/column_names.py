@@ -5,7 +5,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_part, unit_of_text, unit_within, whole_unit
+from hil.importing.units import (
+    QUANTITY_OF_UNIT,
+    split_unit,
+    unit_named,
+    unit_of_part,
+    unit_of_text,
+    unit_within,
+    whole_unit,
+)
 from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
@@ -33,6 +41,7 @@ class Label:
     si: str | None = None  # N m or N if its unit or a word says torque or force
     part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
+    encoder: bool = False  # a word says that an encoder measured it
 
     @property
     def sure(self) -> bool:
@@ -90,6 +99,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _si(words, unit) if quantity is Quantity.EFFORT else None,
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
+        _any(words, known.encoder),
     )
 
 

@@ -122,7 +122,11 @@ def _text(path: Path) -> ForeignTable:
     units = {name: of_lines[title] for name, title in titles.items() if title in of_lines} | header.units | rows.told
     words = {name: told[title][0] for name, title in titles.items() if title in told} | header.words
     constants = _counted_period(dialect.above, rows.lines.size) | Stated().constants(dialect.above, columns, units)
-    read_lines = {line for line in header.unused if any(one.text == header_text(dialect.above[line]) for one in constants.values())}
+    read_lines = {
+        line
+        for line in header.unused
+        if any(one.text == header_text(dialect.above[line]) for one in constants.values())
+    }
     header.notes += [
         f"header: line {line + 1} is not used: {shown(text)!r}"
         for line, text in header.unused.items()
@@ -195,8 +199,7 @@ def _mat(path: Path) -> ForeignTable:
 
 
 def _text_in(values: NDArray[Any]) -> str | None:
-    """Text of a character array or of a cell array of texts, its rows with semicolons between; None for other values.
-    """
+    """Text of a character array or of cells of texts, its rows with semicolons between; None for other values."""
     if values.dtype.kind == "O" and values.ndim:  # without a dimension: an object that is no array
         rows = [_text_in(np.asarray(one)) for one in values.reshape(-1)]
         return None if None in rows or not rows else "; ".join(row for row in rows if row)

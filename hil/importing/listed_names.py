@@ -21,7 +21,9 @@ class ListedNames:
 def listed_names(lines: Sequence[str], delimiter: str, width: int) -> ListedNames | None:
     """Names of `width` columns, numbered from 0 or 1 in turn and all different; None without such a list."""
     words = "|".join(lexicon().enumerated)
-    place = re.compile(rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)]", re.IGNORECASE)
+    place = re.compile(
+        rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)]", re.IGNORECASE
+    )
     given: list[tuple[int, int, str]] = []
     for index, line in enumerate(lines):
         found = list(place.finditer(line))

@@ -187,7 +187,7 @@ def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place
     again = back > 1 and np.ptp(falls) < GAP_STEPS * usual and -falls.max() > GAP_STEPS * usual
     if time_s.min() == time_s.max():
         raise RateNeeded(f"{place(row)}: the stamps are all {time_s[0]:g} s")
-    elif not steps[row - 1]:
+    if not steps[row - 1]:
         problem = "repeats (a duplicate row, or stamps with too few digits)"
     elif again:
         problem = f"runs back by {-np.median(falls):.6g} s in {back} places"

@@ -154,14 +154,13 @@ def _positions(
             names.remove(name)
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if name not in commands]
-    if not efforts and len(commands) == 1 == len(measured):
-        if follows_steps(live[commands[0]], live[measured[0]]):
-            (roles.motor,), (roles.table,) = commands, measured
-            roles.unsure.append(
-                f"{roles.motor}: set-point in steps, which {roles.table} follows by one ratio; without a torque it stands "
-                "for the motor's position, and what lies between the two is the transmission with the motor's load angle"
-            )
-            return
+    if not efforts and len(commands) == 1 == len(measured) and follows_steps(live[commands[0]], live[measured[0]]):
+        (roles.motor,), (roles.table,) = commands, measured
+        roles.unsure.append(
+            f"{roles.motor}: set-point in steps, which {roles.table} follows by one ratio; without a torque it stands "
+            "for the motor's position: what lies between the two is the transmission with the motor's load angle"
+        )
+        return
     if efforts and not commands and len(measured) > 1:
         encoders = named_encoders(measured, labels)
         told = [name for name in measured if labels[name].motor or labels[name].table or labels[name].measured]

@@ -40,6 +40,10 @@ class Stated:
             called = re.fullmatch(words, _plain(name.rpartition(".")[2])) is not None
             told = {one: unit for one, (_, unit) in described([text], names, called).items() if unit}
             found = {_plain(one): unit for one, unit in told.items() if _goes_with(one, unit)} | found
+            for one in self.numbers if called or told else ():  # a rate in Hz is no channel
+                beside = re.search(rf"(?<!\w){re.escape(one)}[\s:=(\[]+([^\s;,)\]]+)", text)
+                if beside and beside[1].lower() in lexicon().constants[Constant.RATE].units:
+                    found.setdefault(_plain(one), beside[1])
         return found
 
     def constants(self, lines: Iterable[str] = (), columns: Mapping[str, FloatArray] | None = None,

@@ -88,7 +88,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     return Label(
         column,
         quantity,
-        _any(words, known.command),
+        _any(words, known.command) or (_any(words, known.steps) and not _any(words, known.encoder)),
         _any(words, known.measured),
         _any(words, known.motor),
         _any(words, known.table),

@@ -131,6 +131,7 @@ class Lexicon(_Entry):
     measured: Words
     motor: Words
     table: Words
+    steps: Words
     encoder: Words
     part: Words
     attached_after: Words

@@ -17,6 +17,7 @@ from hil.importing.lexicon import Constant, Quantity, RowKind, lexicon, without_
 from hil.importing.unit_lines import described
 from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
+_LONGEST = 10_000  # characters of a text that may tell units
 _VALUE = re.compile(r"(.+?)[\W_]*(value|wert)")
 
 
@@ -36,7 +37,7 @@ class Stated:
         ending = re.compile(rf"(.+?)[\W_]*(?:{words})")
         matches = ((ending.fullmatch(_plain(name)), text) for name, text in self.texts.items())
         found = {match[1]: text for match, text in matches if match}
-        for name, text in self.texts.items():
+        for name, text in ((name, text) for name, text in self.texts.items() if len(text) < _LONGEST):
             called = re.fullmatch(words, _plain(name.rpartition(".")[2])) is not None
             told = {one: unit for one, (_, unit) in described([text], names, called).items() if unit}
             found = {_plain(one): unit for one, unit in told.items() if _goes_with(one, unit)} | found

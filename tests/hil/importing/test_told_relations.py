@@ -72,7 +72,7 @@ def test_a_speed_in_turns_beside_a_length_tells_a_screw_of_a_current(tmp_path: P
 STEPS = np.round(AXIS["angle"] / (2 * np.pi) * 6400)
 
 
-@pytest.mark.parametrize(("command", "encoder"), [("CMD", "ENC"), ("Schritte", "Geber"), ("steps_set", "pos_fb")])
+@pytest.mark.parametrize(("command", "encoder"), [("CMD", "ENC"), ("Schritte", "Geber"), ("steps", "enc_steps")])
 def test_steps_that_an_encoder_follows_are_the_motion(tmp_path: Path, command: str, encoder: str) -> None:
     counts = np.round(AXIS["angle"] / (2 * np.pi) * 2400) + 512
     draft = drafted(tmp_path / "log.csv", {command: STEPS, encoder: counts})

@@ -166,9 +166,10 @@ def _positions(
         told = [name for name in measured if labels[name].motor or labels[name].table or labels[name].measured]
         plain = [name for name in measured if name not in (*told, *encoders)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
-        if not commands and len(plain) == len(measured) == 2:
+        if not commands and len(measured) == 2 and plain and not told:
             driving = [live[name] for name in efforts]
-            commands, why = unanswered_one({name: live[name] for name in plain}, driving, period_s)
+            commands, why = unanswered_one({name: live[name] for name in measured}, driving, period_s)
+            commands = [name for name in commands if name in plain]  # an encoder is none
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
         measured = [name for name in measured if name not in commands]
     if not measured:

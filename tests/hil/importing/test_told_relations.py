@@ -30,7 +30,7 @@ def column_of(draft: MapDraft, channel: str) -> object:
 
 @pytest.mark.parametrize(
     ("motor", "load"),
-    [("enc1_mm", "enc2_mm"), ("Geber 2 [mm]", "Geber 1 [mm]"), ("x2_mm", "x1_mm"), ("codeur_mm", "x_mm")],
+    [("enc1_mm", "enc2_mm"), ("Geber 2 [mm]", "Geber 1 [mm]"), ("x2_mm", "x1_mm"), ("codeur2_mm", "codeur1_mm")],
 )
 def test_two_encoders_are_no_set_point_with_less_noise(tmp_path: Path, motor: str, load: str) -> None:
     fine = AXIS["x_act"] + 1e-5 * NOISE[0]

@@ -4,7 +4,9 @@ HilError          1   something went wrong that the user can act on
 ├── StillPowered  3   the drive does not confirm that its power stage is off
 ├── StoppedByUser 130 ctrl-C or a signal before anything moved
 └── InputError    2   a file or an argument is wrong; the message says what, where, what is allowed
-    └── FieldError    the same, at one field of a model whose file is known to the caller only
+    ├── FieldError    the same, at one field of a model whose file is known to the caller only
+    ├── RateNeeded    a file without times; the command that reads it takes its rate
+    └── PartOfAxis    a file without the position or the torque of the axis; another one may have it
 """
 
 from collections.abc import Iterable
@@ -53,6 +55,22 @@ class FieldError(InputError, ValueError):
     def inside(self, *outer: str | int) -> Self:
         """The same error seen from the model that contains this one."""
         return type(self)((*outer, *self.field), self.message)
+
+
+class RateNeeded(InputError):
+    """The rows of a file have no usable times; `problem` says why, a command that takes a rate names itself."""
+
+    def __init__(self, problem: str, command: str = "hil import FILE") -> None:
+        super().__init__(f"{problem}; say the rate of the rows: {command} --rate HZ")
+        self.problem = problem
+
+
+class PartOfAxis(InputError):
+    """A file lacks the position or the torque of the axis, which another file of the same run may have."""
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(f"{problem}; or, if another file of the same run has it, join the two by time into one file")
+        self.problem = problem
 
 
 def listed(names: Iterable[str], most: int = 20) -> str:

@@ -21,7 +21,7 @@ from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.time_left import BUDGET_S
 from hil.drafting.draft_mark import draft_state, marked
 from hil.drafting.drafted_bench import DraftedBench, drafted
-from hil.errors import InputError
+from hil.errors import InputError, PartOfAxis, RateNeeded, listed
 from hil.exchange.own_file import read_exported
 from hil.files.input_file import is_file
 from hil.files.output import rewritten_folder, write_text
@@ -115,7 +115,16 @@ def explain(
     assumed = list[str]()
     for source in paths:
         progress(f"reading {source.name}")
-        recording, notes = _recording(source, folder, rate_hz, axis)
+        try:
+            recording, notes = _recording(source, folder, rate_hz, axis)
+        except PartOfAxis as error:
+            if len(paths) == 1:
+                raise
+            raise InputError(
+                f"{error.problem}; {listed(one.name for one in paths)} look like loggers of one run: join them by time "
+                "into one file with a column for each channel; several files are several recordings of one axis, each "
+                "with its position and torque"
+            ) from None
         read.append(recording)
         assumed += notes
     progress("taking the bench, or drafting it")
@@ -142,7 +151,10 @@ def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | No
             return read_recording(source), []
     notes = [f"{path}: used as it is"]
     if not is_file(path):
-        draft = draft_map(source, rate_hz, axis)
+        try:
+            draft = draft_map(source, rate_hz, axis)
+        except RateNeeded as error:
+            raise RateNeeded(error.problem, shlex.join(["hil", "explain", str(source)])) from None
         take_own_units(draft)
         folder.mkdir(parents=True, exist_ok=True)
         write_text(path, map_text(draft))

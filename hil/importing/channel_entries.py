@@ -6,11 +6,11 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.channels import AXIS_CHANNELS, AxisKind
-from hil.errors import InputError
+from hil.errors import InputError, PartOfAxis
 from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.effort_entry import effort_entry, signs_of
-from hil.importing.encoder_counts import CountSize, assumed, from_length, from_speed, scale_count
+from hil.importing.encoder_counts import CountSize, assumed, counts_ratio, from_length, from_speed, scale_count
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import Asked, DraftedChannel, MapDraft, ask_column
 from hil.importing.map_file import ChannelSource
@@ -40,7 +40,8 @@ class ChannelEntries:
         self.kind = AxisKind.ROTARY
         self.motor_sign = 1
         self.per_count = 1.0  # SI units of the motor per count, if it is in counts
-        self.unsized: dict[str, str] = {}  # keys of the size of its count that are asked
+        self.unsized: dict[str, float] = {}  # keys of the size of its count that are asked, with what stands for them
+        self.ratio = 1.0  # turns of the motor for each of its position, which is that of the load
 
     def fill(self) -> None:
         """Add the entries. Raises InputError: no column can go with the motion, or two units contradict each other."""
@@ -67,7 +68,7 @@ class ChannelEntries:
             return
         motion_of = f"position {roles.motor}" if roles.motor else f"speed {roles.motor_velocity}"
         told = "".join(f"{name}: {why}; " for name, why in roles.left_out.items() if "explain" in why)
-        raise InputError(
+        raise PartOfAxis(
             f"{self.draft.table.path}: {told}beside the {motion_of} no torque, force, current, voltage or second "
             "encoder is found; record one"
         )
@@ -83,12 +84,12 @@ class ChannelEntries:
         how = f"{what}; {self.roles.how[column]}" if column in self.roles.how else what
         self.draft.channels.append(DraftedChannel(channel, {"column": column, **keys}, how))
 
-    def _kind(self, length: bool) -> AxisKind:
-        """Kind of the axis, whose motor is recorded in a `length` or an angle: a motor with a torque turns a screw."""
+    def _kind(self, length: bool, screw: bool = False) -> AxisKind:
+        """Kind of the axis, whose motor is recorded in a `length` or an angle: a torque, or turns, tell a screw."""
         if not length:
             return AxisKind.ROTARY
         far = self.roles.table is not None and is_length(self.units[self.roles.table])
-        screw = self.effort_si == "N m" or Constant.LEAD in self.draft.table.constants or far
+        screw = screw or self.effort_si == "N m" or Constant.LEAD in self.draft.table.constants or far
         return AxisKind.ROTARY if screw and self.effort_si != "N" else AxisKind.LINEAR
 
     def _positions(self, name: str) -> None:
@@ -108,8 +109,10 @@ class ChannelEntries:
             size = self._count_size(name, length, relations[length].factor if length else 0.0)
             keys |= size.entry
             draft.unsure += [size.note] if size.note else []
-            motor, self.per_count, self.unsized = size.unit, size.per_count, dict(size.asked)
-        self.kind = self._kind(is_length(motor))
+            motor, self.per_count = size.unit, size.per_count
+            self.unsized = {key: size.entry[key] for key in size.asked}
+        screw = not counted and name not in self.asked and self.positions.lead_by_speed(name) is not None
+        self.kind = self._kind(is_length(motor), screw)
         channel = AXIS_CHANNELS[self.kind].motor_position
         for key, what in size.asked.items() if counted else {}:
             draft.asked.append(Asked(channel, key, f"{name}: {what}"))
@@ -128,8 +131,9 @@ class ChannelEntries:
             else:
                 draft.lead_m = ROTARY_LEAD_M
                 draft.lead_how = "a rotary axis: one metre of the load stands for one radian"
+                keys |= {} if counted or roles.table else self._gear(name)
         keys |= {"sign": -1} if self.motor_sign < 0 else {}
-        self._add(channel, name, "the motor's encoder", keys)
+        self._add(channel, name, "steps of the motor" if self.labels[name].command else "the motor's encoder", keys)
         for other, channel, what in (
             (roles.table, "table_position_m", "the second encoder"),
             (roles.command, "position_command_m", "the set-point"),
@@ -137,6 +141,18 @@ class ChannelEntries:
             if other is not None:
                 factor, share = relations[other].factor * self.motor_sign, relations[other].share
                 self._far(other, channel, what, factor, share, motor)
+
+    def _gear(self, name: str) -> dict[str, object]:
+        """Scale of an angle of the load, by a speed of the motor; its torque is then beside its own angle."""
+        geared = self.positions.gear_by_speed(name)
+        if geared is None:
+            return {}
+        self.ratio, speed = geared
+        self.draft.unsure.append(
+            f"{name}: is an angle of the load; the motor turns {self.ratio:g} times as far (from column {speed}): "
+            "scale, so that position, inertia and friction are those of the motor"
+        )
+        return {"scale": self.ratio}
 
     def _lead(self, name: str, counted: bool = False) -> None:
         """Lead of a motor whose motion `name` is told in a length: of the header, by a speed in turns, else asked."""
@@ -186,10 +202,12 @@ class ChannelEntries:
                     f"{name}: comes {1e3 * late_s:.3g} ms after {encoder}, a set-point comes before: its "
                     "stamps are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
+        keys |= {"scale": self.ratio} if self.ratio != 1.0 else {}
         same = abs(abs(factor) - 1.0) < SAME_COUNTS
         if unit == "counts" and self.unsized:  # its counts are told when those of the encoder are
-            given = f"write the same as for {encoder}" if same else f"1 of them is {abs(factor):.6g} of {encoder}"
-            keys |= dict.fromkeys(self.unsized, self.per_count)
+            ratio = 1.0 if same else counts_ratio(abs(factor))
+            given = f"write the same as for {encoder}" if same else f"write {ratio:.6g} times that of {encoder}"
+            keys |= {key: size * ratio for key, size in self.unsized.items()}
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             per_count = self.per_count / (1.0 if same else abs(factor))

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import RateNeeded
 from hil.importing.column_names import Label, label
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.lexicon import Constant, Quantity, lexicon
 from hil.importing.map_file import SECONDS, TimeColumn
+from hil.importing.row_counters import counts_rows
 from hil.importing.stamp_columns import (
     FASTEST_HZ,
     SLOWEST_HZ,
@@ -63,10 +64,9 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
     if found := clock_of(table, labels, named[:1], told):
         return found
     text = next((remark for remark in table.remarks if label(remark.split(":")[0]).quantity is Quantity.TIME), None)
-    raise InputError(
-        f"{table.path}: no column of time stamps is found"
-        + (f" ({text})" if text else "")
-        + ", allowed one in seconds or a known rate; say the rate of the rows: hil import FILE --rate HZ"
+    raise RateNeeded(
+        f"{table.path}: no column of time stamps is found{f' ({text})' if text else ''}, and no line above the rows "
+        "tells their rate or period"
     )
 
 
@@ -149,7 +149,7 @@ def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
             and np.isfinite(steps).all()
             and steps.min() > 0
         ):
-            row_numbers = bool(np.all(steps == 1.0) and values[0] in (0.0, 1.0))
+            row_numbers = counts_rows(values) and values[0] in (0.0, 1.0)
             if np.ptp(steps) < 0.2 * np.median(steps) and not row_numbers:
                 return [name]
     return []
@@ -160,18 +160,16 @@ def _refuse_missing(table: ForeignTable, stamps: Stamps) -> None:
     if bad.size:
         line, text = table.texts.get(stamps.time.column, (0, "an empty field"))
         place = f"{table.path}:{line}" if line else table.place(int(bad[0]))
-        raise InputError(
+        raise RateNeeded(
             f"{place}: {stamps.time.column}: the row has no time stamp: given {text!r}; import the part of the "
-            "file before it, or the rows by their rate: hil import FILE --rate HZ"
+            "file before it"
         )
 
 
 def _of_rate(table: ForeignTable, labels: dict[str, Label], rate_hz: float, how: str) -> StampClock:
     """Clock of equal rows; a column that numbers them tells where some are missing."""
     for name, values in table.columns.items():
-        steps = np.diff(values)
-        counts = labels[name].quantity in (Quantity.UNKNOWN, Quantity.OTHER) and bool(np.all(steps >= 1.0))
-        if counts and np.all(steps == np.round(steps)) and np.median(steps) == 1.0 and steps.max() > 1.0:
+        if labels[name].quantity is not Quantity.TIME and counts_rows(values) and np.diff(values).max() > 1.0:
             time = TimeColumn(column=name, unit="s", scale=1.0 / rate_hz)
             note = f"clock: {name} numbers the rows; where it steps by more than 1, rows are missing"
             return StampClock((values - values[0]) / rate_hz, time, None, f"numbers of the rows, {how}", (note,))
@@ -184,11 +182,14 @@ def _plausible(rate_hz: float) -> bool:
 
 
 def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
+    """Rate [Hz] that the file gives beside its columns, with its source: a line or a scalar."""
+    told = table.constants.get(Constant.RATE)
+    if told and _plausible(told.value):
+        return told.value, f"period from the line {told.text!r}"
     for name, value in table.scalars.items():
         plain = name.rpartition(".")[2].lower()
         if plain in lexicon().scalars.rate and _plausible(value):
             return value, f"scalar {name} of the file"
         if plain in lexicon().scalars.period and _plausible(1.0 / (value or 1e9)):
             return 1.0 / value, f"scalar {name} of the file, as period in s"
-    told = table.constants.get(Constant.RATE)
-    return (told.value, f"header of the file: {told.text}") if told and _plausible(told.value) else None
+    return None

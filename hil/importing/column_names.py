@@ -5,7 +5,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
-from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named, unit_of_part, unit_of_text, whole_unit
+from hil.importing.units import (
+    QUANTITY_OF_UNIT,
+    split_unit,
+    unit_named,
+    unit_of_part,
+    unit_of_text,
+    unit_within,
+    whole_unit,
+)
 from hil.quantities import UNITS
 
 _NOTHING = (Quantity.UNKNOWN, False)
@@ -33,6 +41,7 @@ class Label:
     si: str | None = None  # N m or N if its unit or a word says torque or force
     part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
+    encoder: bool = False  # a word says that an encoder measured it
 
     @property
     def sure(self) -> bool:
@@ -63,6 +72,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]
     found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
     quantity, letter = next((one for one in found if one != _NOTHING), _NOTHING)
+    if unit is None and not odd and not letter and quantity is not Quantity.UNKNOWN:
+        unit = unit_within(name, quantity)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
     if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):
@@ -77,7 +88,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     return Label(
         column,
         quantity,
-        _any(words, known.command),
+        _any(words, known.command) or (_any(words, known.steps) and not _any(words, known.encoder)),
         _any(words, known.measured),
         _any(words, known.motor),
         _any(words, known.table),
@@ -88,6 +99,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _si(words, unit) if quantity is Quantity.EFFORT else None,
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
+        _any(words, known.encoder),
     )
 
 

@@ -20,10 +20,6 @@ from hil.quantities import UNITS
 CAUSED = 0.3  # share of an effort explained by its motion from which its sign can be judged
 TOGETHER = 0.25  # share of the variance that torque and command have in common, from which they have one cause
 _UNKNOWN = "(if nobody knows it, write 1: inertia and friction are then multiples of the true ones)"
-_OR_SCREW = (
-    "; or of a motor with a screw rename motor_position_m to motor_position_rad and force_n to torque_n_m, and write "
-    "torque_constant_n_m_a here and lead_m above"
-)
 PART = 0.1  # of the effort: the inertia's part must exceed it, else the sign of friction decides
 
 
@@ -97,8 +93,9 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         if text:
             entry.notes.append(f"{column}: its constant is taken from the header of the file: {text}")
         else:
+            screw = _screw("the N m at 100 %") if linear else ""
             whole = "rated current" if told.electric else "rated force" if linear else "rated torque"
-            entry.asked["rated"] = f"is in {unit} of the {whole}; write the {si} at 100 % {_UNKNOWN}"
+            entry.asked["rated"] = f"is in {unit} of the {whole}; write the {si} at 100 % {_UNKNOWN}{screw}"
         return entry
     header = constants.get(Constant.FORCE if linear else Constant.TORQUE)
     if unit == "A" and header is not None:
@@ -133,7 +130,7 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         return entry
     given = "" if told.unit else f" (unit {unit} by its name)"
     constant = "force constant" if linear else "torque constant"
-    screw = _OR_SCREW if linear and unit == "A" else ""
+    screw = _screw("torque_constant_n_m_a") if linear and unit == "A" else ""
     what = (
         f"the {constant} of the motor"
         if unit == "A"
@@ -141,6 +138,14 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
     )
     entry.asked[key if unit == "A" else "gain"] = f"is in {unit}{given}; write {what} in {si}/{unit} {_UNKNOWN}{screw}"
     return entry
+
+
+def _screw(what: str) -> str:
+    """What to change for a motor that turns a screw or a belt; `what` is written in the place of the question."""
+    return (
+        "; or of a motor with a screw or belt rename motor_position_m to motor_position_rad and force_n to torque_n_m, "
+        f"and write {what} here and lead_m above"
+    )
 
 
 def _rated(told: Label, linear: bool, table: ForeignTable) -> tuple[float, str]:

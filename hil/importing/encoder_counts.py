@@ -4,6 +4,7 @@ And the unit of an angle, in which its steps are counts of an encoder.
 """
 
 from dataclasses import dataclass, field
+from fractions import Fraction
 from math import pi
 
 import numpy as np
@@ -20,6 +21,7 @@ _USUAL = 0.003  # relative deviation from usual counts, or from a usual pair of 
 
 _SCALE = 0.01  # deviation of the count of a linear scale: the errors of a lead are below
 _WHOLE = 1e-3  # deviation from usual counts per turn: that of steps of few digits
+_LARGEST = 32  # denominator of a ratio of two encoders or steppers: 4000 counts for 3200 steps are 5/4
 _DECIMAL = 1e-3  # deviation of a step from a power of ten: of printed digits it tells nothing
 
 
@@ -73,6 +75,12 @@ def scale_count(per_m: float) -> float | None:
     power = 10.0 ** np.floor(np.log10(per_m))
     usual = (factor * float(power) for factor in (1.0, 2.0, 5.0, 10.0))
     return next((one for one in usual if abs(per_m / one - 1.0) < _SCALE), None)
+
+
+def counts_ratio(ratio: float) -> float:
+    """Counts of one encoder or stepper for each of another, a fraction of small numbers if it is nearly one."""
+    usual = float(Fraction(ratio).limit_denominator(_LARGEST))
+    return usual if usual and abs(ratio / usual - 1.0) < _WHOLE else ratio
 
 
 def angle_unit(column: str, values: FloatArray, speeds: list[tuple[str, float]]) -> UnitChoice | None:

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,12 +17,13 @@ from hil.files.date_stamps import is_date, seconds_of
 from hil.importing.csv_dialect import MOST_LINES, find_dialect
 from hil.importing.foreign_columns import as_measured, check_foreign, format_of, parquet_dates
 from hil.importing.header_rows import read_factor
-from hil.importing.header_values import HeaderValue
+from hil.importing.header_values import HeaderValue, header_text
 from hil.importing.lexicon import Constant
 from hil.importing.map_file import SECONDS, CsvOptions
 from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
 from hil.importing.stated import Stated
+from hil.importing.text_lines import shown
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
 from hil.importing.variables import load_variables
@@ -119,12 +121,23 @@ def _text(path: Path) -> ForeignTable:
         read_factor(header, name, of_lines.get(title, ""))
     units = {name: of_lines[title] for name, title in titles.items() if title in of_lines} | header.units | rows.told
     words = {name: told[title][0] for name, title in titles.items() if title in told} | header.words
+    constants = _counted_period(dialect.above, rows.lines.size) | Stated().constants(dialect.above, columns, units)
+    read_lines = {
+        line
+        for line in header.unused
+        if any(one.text == header_text(dialect.above[line]) for one in constants.values())
+    }
+    header.notes += [
+        f"header: line {line + 1} is not used: {shown(text)!r}"
+        for line, text in header.unused.items()
+        if line not in read_lines
+    ]
     return ForeignTable(
         path,
         columns,
         units,
         csv=options,
-        constants=_counted_period(dialect.above, rows.lines.size) | Stated().constants(dialect.above, columns, units),
+        constants=constants,
         remarks=tuple(remarks),
         dates=frozenset(rows.dates),
         texts={name: cell for name, cell in rows.texts.items() if name in columns},
@@ -164,8 +177,8 @@ def _mat(path: Path) -> ForeignTable:
     arrays, units = load_variables(path)
     for name, variable in arrays.items():
         values = np.asarray(variable)
-        if values.dtype.kind == "U" and values.size == 1:
-            stated.texts[name] = str(values.reshape(-1)[0])
+        if (text := _text_in(values)) is not None:
+            stated.texts[name] = text
         elif values.dtype.kind not in "fiub":
             others.append(name)
         elif values.size == 1:
@@ -183,6 +196,16 @@ def _mat(path: Path) -> ForeignTable:
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
     return _with_stated(ForeignTable(path, columns, units, remarks=tuple(remarks)), stated)
+
+
+def _text_in(values: NDArray[Any]) -> str | None:
+    """Text of a character array or of cells of texts, its rows with semicolons between; None for other values."""
+    if values.dtype.kind == "O" and values.ndim:  # without a dimension: an object that is no array
+        rows = [_text_in(np.asarray(one)) for one in values.reshape(-1)]
+        return None if None in rows or not rows else "; ".join(row for row in rows if row)
+    if values.dtype.kind != "U" or not values.size:
+        return None
+    return "; ".join(str(one).strip() for one in values.reshape(-1))
 
 
 def _with_stated(table: ForeignTable, stated: Stated) -> ForeignTable:

@@ -12,6 +12,7 @@ from math import isfinite
 from hil.files.date_stamps import is_date
 from hil.importing.column_names import label, plain_words
 from hil.importing.lexicon import Quantity, RowKind, lexicon
+from hil.importing.listed_names import listed_names
 from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
 from hil.importing.text_lines import shown, split_line, times_of_groups
@@ -48,7 +49,7 @@ class Header:
     `names` are different for each column; `titles` the text of the file for a column with another name. `scales` are
     factor and offset with which a column becomes a value in its unit, `row_scales` those of rows of their own, which
     the values may hold already; `periods_s` the periods of its rows. `line` is
-    the row that alone gives the names.
+    the row that alone gives the names, `unused` are rows (from 0) of which nothing was read here.
     """
 
     names: tuple[str, ...]
@@ -60,11 +61,16 @@ class Header:
     periods_s: dict[str, float] = field(default_factory=dict)
     line: int | None = None
     notes: list[str] = field(default_factory=list)
+    unused: dict[int, str] = field(default_factory=dict)
 
 
 def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberForm, counted: bool = False) -> Header:
     """Read the lines above `width` columns of numbers; `counted`: the first one numbers the rows, perhaps nameless."""
-    read = (_row(index, line, delimiter, width, form, counted) for index, line in enumerate(lines))
+    listed = listed_names(lines, delimiter, width)
+    of_list = listed.lines if listed else frozenset[int]()
+    read = (
+        _row(index, line, delimiter, width, form, counted) for index, line in enumerate(lines) if index not in of_list
+    )
     rows = [row for row in read if row is not None]
     # a row that is one field short counts where no other one tells what the columns are
     rows = [row for row in rows if row.whole] if any(row.whole and row.sure for row in rows) else rows
@@ -74,7 +80,10 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
         # short names may be those of units: s, v, a
         named = next((row for row in rows if row.kind is RowKind.UNITS), None)
         rows = [row for row in rows if row is not named]
-    header = Header(_different(named, texts, width))
+    if listed is not None and named is not None and sum(label(one).sure for one in listed.names) > named.sure:
+        named = None
+    listed = listed if named is None else None
+    header = Header(listed.names if listed else _different(named, texts, width))
     if named is not None and named.fields == header.names and named.text == lines[named.line]:
         header.line = named.line
     used = {named.line} if named else set[int]()
@@ -93,12 +102,12 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
                 header.periods_s = {name: unit * value for name, value in told.items() if unit * value > 0.0}
             case RowKind.TYPES | RowKind.NAMES if row is not named:
                 pass
-            case RowKind.TEXT if row is not named:
+            case RowKind.TEXT if row is not named and not listed:
                 header.words = {name: f"{header.words.get(name, '')} {text}".strip() for name, text in given.items()}
             case _ if row is not named:
-                header.notes.append(f"header: line {row.line + 1} is not used: {shown(row.text)!r}")
+                header.unused[row.line] = row.text
         used.add(row.line)
-    if named is None:
+    if named is None and listed is None:
         near = [index for index in range(len(lines)) if lines[index].strip() and index not in used][-_NEAR:]
         if near and len(split_line(COMMENT.sub("", lines[near[-1]]), delimiter)) > 1:
             header.notes.append(
@@ -121,6 +130,8 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, co
         fields = ["" if index in times else value for index, value in enumerate(fields)]
     elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
         fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
+    elif colon and len(fields) == width + 1 and fields[0] == f"{word}:":
+        fields = fields[1:]  # a word of any language before the names
     elif len(fields) == width + 1 and _kind(fields[1:], form) is RowKind.UNITS and unit_of_text(fields[0]) is None:
         kind, fields = RowKind.UNITS, fields[1:]
     elif len(fields) > width:

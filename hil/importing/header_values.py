@@ -26,18 +26,20 @@ class HeaderValue:
 
 @dataclass(frozen=True)
 class _Statement:
-    """Words, the number that follows them, the texts that may be its unit, and the whole text."""
+    """Words, the number that follows them, the texts that may be its unit, the whole text, and the last phrase."""
 
     words: str
     number: float
     units: tuple[str, ...]
     text: str
+    phrase: str = ""
 
 
 _NUMBER = re.compile(r"(?<![\w.])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
 _HEX = re.compile(r"\b0x[0-9a-f]+(:[0-9a-f]+)?|(?<=\w)\[\d+\]")  # addresses, and the index of a parameter
 _BRACKET = re.compile(r"[\[({]([^\[({]*?)[\])}][\s:=;,|\"']*$")
 _SEPARATED = re.compile(r"[\s:=;,|\"']*")
+_PHRASES = re.compile(r"[;,|\t:=\"]+")
 _SIGNS = re.compile(r"[\s·・*.\"']+")  # between the parts of a unit
 _TEXT_OF_NAME = re.compile(r"[^\w/]+|_")
 _PER = re.compile(r"/|per|pro|je|par")
@@ -54,11 +56,11 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     given = [one for line in _without_products(list(lines)) for one in _statements(line)]
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
-        given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}"))
+        given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}", words))
     found: dict[tuple[bool, Constant], list[HeaderValue]] = {}
     for one in given:
         units = one.units if any(one.units) else (*one.units, None)
-        if told := next((known for unit in units if (known := _constant(one.words, one.number, unit))), None):
+        if told := next((known for unit in units if (known := _constant(one, unit))), None):
             by_words, constant, value = told
             found.setdefault((by_words, constant), []).append(HeaderValue(value, one.text))
     # what words say goes before what a unit alone says
@@ -80,7 +82,7 @@ def _statements(line: str) -> Iterator[_Statement]:
         return
     if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole[1])) is not None:
         unit = _SIGNS.sub("", whole[2])
-        yield from (_Statement(words, size, (unit,), _shown(line)) for words in ("rated torque", "rated force"))
+        yield from (_Statement(words, size, (unit,), header_text(line)) for words in ("rated torque", "rated force"))
         return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
@@ -93,10 +95,11 @@ def _statements(line: str) -> Iterator[_Statement]:
         name, unit = _unit_of_name(before)
         behind = tuple(_units_behind(folded[match.end() : end]))
         units = [_SIGNS.sub("", bracket[1])] if bracket else []
-        words = _plain(before[: bracket.start()]) if bracket else _plain(before)
+        told = before[: bracket.start()] if bracket else before
+        words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
         if unit and not any(behind) and not bracket:
-            words, units = name, [unit]
-        yield _Statement(words, value, (*units, *behind), _shown(line))
+            words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
+        yield _Statement(words, value, (*units, *behind), header_text(line), phrase)
 
 
 def _is_list(text: str, matches: list[re.Match[str]], value: float) -> bool:
@@ -123,16 +126,17 @@ def _units_behind(text: str) -> Iterator[str]:
         yield ""
 
 
-def _constant(words: str, value: float, unit: str | None) -> tuple[bool, Constant, float] | None:
+def _constant(told: _Statement, unit: str | None) -> tuple[bool, Constant, float] | None:
     """Constant that words and unit tell, True if the words do, and its value in SI; `unit` is None where none is given.
 
     Without a unit only words that stand for nothing else are taken, not those of a lead, which may be in mm or m.
     """
+    words, value = told.words, told.number
     if not 0.0 < value < np.inf:
         return None
     ratio = _of_ratio(value, _amperes(unit)) if unit else None
     for constant, known in lexicon().constants.items():
-        if not re.search(_pattern(known), words):
+        if not re.search(_pattern(known), words) and not re.fullmatch(known.alone, told.phrase):
             continue
         if ratio and ratio[0] is constant:
             return True, *ratio
@@ -211,7 +215,8 @@ def _unit_of_name(name: str) -> tuple[str, str]:
     return " ".join(tokens), ""
 
 
-def _shown(line: str) -> str:
+def header_text(line: str) -> str:
+    """A line as a constant that it gives shows it."""
     return " ".join(line.strip().strip('"#%/; ').split())
 
 

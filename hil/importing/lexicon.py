@@ -97,10 +97,11 @@ class _Entry(BaseModel):
 
 
 class ConstantWords(_Entry):
-    """Regular expression of the words of a constant, and factors of its units to SI."""
+    """Regular expressions of the words of a constant, and factors of its units to SI; `alone` is a whole statement."""
 
     words: Annotated[str, BeforeValidator(_pattern)]
     units: dict[str, PositiveFloat]
+    alone: Annotated[str, BeforeValidator(_pattern)] = "(?!)"
 
 
 class ScalarNames(_Entry):
@@ -130,6 +131,8 @@ class Lexicon(_Entry):
     measured: Words
     motor: Words
     table: Words
+    steps: Words
+    encoder: Words
     part: Words
     attached_after: Words
     attached_before: Words
@@ -146,6 +149,7 @@ class Lexicon(_Entry):
     joints: Words
     scalars: ScalarNames
     series: SeriesWords
+    enumerated: Words
     missing: Words
     infinite: Words
     rows: dict[RowKind, Annotated[str, BeforeValidator(_pattern)]]

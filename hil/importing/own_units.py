@@ -19,15 +19,20 @@ _ONE = {
     "rated": 100.0,
     "gain": 1.0,
 }
+_COUNTED = ("counts_per_rev", "counts_per_m")
 
 
 def take_own_units(draft: MapDraft) -> None:
     """Answer what a draft asks of the size of numbers, and note it as unsure; columns and the lead are asked still."""
+    sizes = {(one.channel, key): value for one in draft.channels for key, value in one.entry.items()}
     without_column = {one.channel for one in draft.asked if one.key == "column"}
     left = list[Asked]()
     for one in draft.asked:
         unit = CHANNELS[one.channel].unit if one.channel else ""
         value = unit if one.key == "unit" else _ONE.get(one.key)
+        if isinstance(value, float) and one.key in _COUNTED:  # of several in counts, the first is the measure
+            first = next(each.channel for each in draft.asked if each.key == one.key)
+            value *= float(str(sizes[one.channel, one.key])) / float(str(sizes[first, one.key]))
         if value is None or not one.channel or one.channel in without_column:
             left.append(one)
             continue

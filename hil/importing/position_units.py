@@ -22,7 +22,7 @@ from hil.importing.unit_choice import (
     unit_of_nameless,
 )
 from hil.importing.units import unit_named
-from hil.importing.usual_values import improbable, screw_units
+from hil.importing.usual_values import USUAL, improbable, screw_units
 from hil.quantities import UNITS
 
 _TOLD = {"N m": (Constant.TORQUE, Constant.RATED_TORQUE), "N": (Constant.FORCE, Constant.RATED_FORCE)}
@@ -119,6 +119,23 @@ class PositionUnits:
             relation = proportional(self.motion(motor).velocity, self.live[speed.column])
             if si == "rad/s" and is_length(self.units[motor]) and relation.share > SAME_POSITION:
                 return 2.0 * pi * abs(relation.factor) * UNITS[self.units[motor]][1] / factor, speed.column
+        return None
+
+    def gear_by_speed(self, motor: str) -> tuple[float, str] | None:
+        """Turns of the motor's speed for each turn of the angle `motor`, and this speed; None where they are the same.
+
+        A ratio that is nearly whole is whole: teeth are.
+        """
+        for speed in self.speeds():
+            si, factor = UNITS[str(speed.unit)]
+            moved, size = self.motion(motor).velocity, UNITS.get(self.units[motor], ("", 1.0))
+            relation = proportional(self.live[speed.column], moved)
+            if si != "rad/s" or size[0] != "rad" or speed.table or relation.share <= SAME_POSITION:
+                continue
+            ratio = abs(relation.factor) * factor / size[1]
+            if ratio > 1.0 + MATCH and not self.labels[motor].motor:
+                whole = round(ratio)
+                return (float(whole) if abs(ratio / whole - 1.0) < USUAL else float(f"{ratio:.6g}")), speed.column
         return None
 
     def _take(self, column: str, choice: UnitChoice) -> None:

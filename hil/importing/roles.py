@@ -1,12 +1,12 @@
 """Assign columns to roles (motor, table, set-points, torque): by their names, else by relations between the columns."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError, listed
+from hil.errors import InputError, PartOfAxis, listed
 from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label
 from hil.importing.computed_position import computed_one, unanswered_one
@@ -15,6 +15,8 @@ from hil.importing.lexicon import Constant, Quantity
 from hil.importing.monitor_outputs import monitor_outputs
 from hil.importing.one_axis import one_axis
 from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, driven, proportional
+from hil.importing.row_counters import COUNTER, rises_evenly
+from hil.importing.two_encoders import follows_steps, motors_encoder, named_encoders
 from hil.importing.unnamed_columns import quantities_by_relations
 
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
@@ -73,6 +75,9 @@ def find_roles(
     roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
     labels = {name: label for name, label in labels.items() if name not in frozen}
     live = {name: columns[name] for name in columns if name in labels}
+    counters = [name for name in live if labels[name].quantity is not Quantity.TIME and rises_evenly(live[name])]
+    roles.left_out |= dict.fromkeys(counters, COUNTER)
+    labels |= {name: replace(labels[name], quantity=Quantity.OTHER) for name in counters}
     labels, roles.how = quantities_by_relations(live, labels, period_s)
     roles.unsure += [f"{name}: its name says nothing; {how}" for name, how in roles.how.items()]
     if outputs := monitor_outputs(live, labels, period_s):
@@ -81,7 +86,7 @@ def find_roles(
     of = {kind: [name for name in live if labels[name].quantity is kind] for kind in Quantity}
     for kind, why in _NO_ROLE.items():
         roles.left_out |= {name: roles.left_out.get(name, why) for name in of[kind]}
-    _positions(live, labels, of[Quantity.POSITION], bool(of[Quantity.EFFORT]), roles, period_s)
+    _positions(live, labels, of[Quantity.POSITION], of[Quantity.EFFORT], roles, period_s)
     moved = motion(live[roles.motor], period_s) if roles.motor else None
     speeds = {name: live[name] for name in of[Quantity.VELOCITY] if not labels[name].command}
     speed = better_speed(speeds, [live[name] for name in of[Quantity.EFFORT]], moved, period_s) if moved else None
@@ -101,7 +106,7 @@ def find_roles(
         roles.unsure += _of_two_axes(live, labels, moved, period_s, roles)
     if roles.motor is None and roles.motor_velocity is None and len(may_be_asked(columns, labels)) < 2:
         told = f"; constant are {listed(frozen)}" if frozen else ""
-        raise InputError(
+        raise PartOfAxis(
             f"{where}: no column is the measured position of the axis (columns: {listed(columns)}{told}); record "
             "it with the torque"
         )
@@ -132,7 +137,7 @@ def _positions(
     live: dict[str, FloatArray],
     labels: dict[str, Label],
     names: list[str],
-    has_effort: bool,
+    efforts: list[str],
     roles: Roles,
     period_s: float,
 ) -> None:
@@ -149,12 +154,22 @@ def _positions(
             names.remove(name)
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if name not in commands]
-    if has_effort and not commands and len(measured) > 1:
-        plain = [name for name in measured if not (labels[name].motor or labels[name].table or labels[name].measured)]
+    if not efforts and len(commands) == 1 == len(measured) and follows_steps(live[commands[0]], live[measured[0]]):
+        (roles.motor,), (roles.table,) = commands, measured
+        roles.unsure.append(
+            f"{roles.motor}: set-point in steps, which {roles.table} follows by one ratio; without a torque it stands "
+            "for the motor's position: what lies between the two is the transmission with the motor's load angle"
+        )
+        return
+    if efforts and not commands and len(measured) > 1:
+        encoders = named_encoders(measured, labels)
+        told = [name for name in measured if labels[name].motor or labels[name].table or labels[name].measured]
+        plain = [name for name in measured if name not in (*told, *encoders)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
-        if not commands and len(plain) == len(measured) == 2:
-            efforts = [live[name] for name in live if labels[name].quantity is Quantity.EFFORT]
-            commands, why = unanswered_one({name: live[name] for name in plain}, efforts, period_s)
+        if not commands and len(measured) == 2 and plain and not told:
+            driving = [live[name] for name in efforts]
+            commands, why = unanswered_one({name: live[name] for name in measured}, driving, period_s)
+            commands = [name for name in commands if name in plain]  # an encoder is none
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
         measured = [name for name in measured if name not in commands]
     if not measured:
@@ -165,6 +180,11 @@ def _positions(
     roles.motor = next((name for name in near if labels[name].motor), None) or min(
         near, key=lambda name: (not labels[name].measured, labels[name].number.zfill(9), near.index(name))
     )
+    why = ""
+    if len(near) == 2 and not any(labels[name].motor or labels[name].table for name in near):
+        speeds = [n for n in live if labels[n].quantity is Quantity.VELOCITY and not labels[n].command]
+        told_by = motors_encoder(near, live, speeds, efforts, period_s)
+        roles.motor, why = (told_by.name, f" ({told_by.why})") if told_by else (roles.motor, "")
     rest = [name for name in (*far, *near) if name != roles.motor]
     for name in [one for one in rest if not labels[one].table]:
         share = proportional(live[name], live[roles.motor]).share
@@ -176,7 +196,7 @@ def _positions(
         roles.table = rest[0]
         if not labels[rest[0]].table:
             roles.unsure.append(
-                f"{rest[0]}: taken for the second encoder and {roles.motor} for the motor's; exchange them if not"
+                f"{rest[0]}: taken for the second encoder and {roles.motor} for the motor's{why}; exchange them if not"
             )
     for name in rest[1:]:
         roles.left_out[name] = "a third position"

@@ -5,15 +5,19 @@ torque_constant = "0.83 Nm/A"      a column kt [Nm/A] with 0.83 in every row
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.importing.column_names import label
 from hil.importing.header_values import HeaderValue, header_values
-from hil.importing.lexicon import Constant, RowKind, lexicon, without_accents
+from hil.importing.lexicon import Constant, Quantity, RowKind, lexicon, without_accents
+from hil.importing.unit_lines import described
+from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
+_LONGEST = 10_000  # characters of a text that may tell units
 _VALUE = re.compile(r"(.+?)[\W_]*(value|wert)")
 
 
@@ -24,17 +28,29 @@ class Stated:
     numbers: dict[str, float] = field(default_factory=dict)
     texts: dict[str, str] = field(default_factory=dict)
 
-    @property
-    def units(self) -> dict[str, str]:
-        """Texts that are the unit of something, by `_plain` of its name."""
-        ending = re.compile(rf"(.+?)[\W_]*(?:{lexicon().rows[RowKind.UNITS]})")
+    def units(self, columns: Iterable[str] = ()) -> dict[str, str]:
+        """Texts that are the unit of something, by `_plain` of its name: of a number, or of one of the `columns`.
+
+        A text that is called units, or has units behind most of the names in it, tells several: "pos um; dt ms".
+        """
+        words, names = lexicon().rows[RowKind.UNITS], [*columns, *self.numbers]
+        ending = re.compile(rf"(.+?)[\W_]*(?:{words})")
         matches = ((ending.fullmatch(_plain(name)), text) for name, text in self.texts.items())
-        return {match[1]: text for match, text in matches if match}
+        found = {match[1]: text for match, text in matches if match}
+        for name, text in ((name, text) for name, text in self.texts.items() if len(text) < _LONGEST):
+            called = re.fullmatch(words, _plain(name.rpartition(".")[2])) is not None
+            told = {one: unit for one, (_, unit) in described([text], names, called).items() if unit}
+            found = {_plain(one): unit for one, unit in told.items() if _goes_with(one, unit)} | found
+            for one in self.numbers if called or told else ():  # a rate in Hz is no channel
+                beside = re.search(rf"(?<!\w){re.escape(one)}[\s:=(\[]+([^\s;,)\]]+)", text)
+                if beside and beside[1].lower() in lexicon().constants[Constant.RATE].units:
+                    found.setdefault(_plain(one), beside[1])
+        return found
 
     def constants(self, lines: Iterable[str] = (), columns: Mapping[str, FloatArray] | None = None,
                   units: Mapping[str, str] | None = None) -> dict[Constant, HeaderValue]:  # fmt: skip
         """Constants of header `lines`, numbers and texts, and of `columns` (n,) with one value, with their `units`."""
-        own = self.units
+        own = self.units(columns or ())
         texts = [f"{name}: {text}" for name, text in self.texts.items()]
         for name, values in (columns or {}).items():
             if values.size and np.isfinite(values).all() and np.ptp(values) == 0.0:
@@ -50,10 +66,16 @@ class Stated:
                 sized[name] = number
         return header_values([*lines, *texts], sized)
 
-    def units_of(self, columns: Iterable[str]) -> dict[str, str]:
+    def units_of(self, columns: Collection[str]) -> dict[str, str]:
         """Units of columns by texts with their name: torque_unit = "Nm"."""
-        own = self.units
+        own = self.units(columns)
         return {name: own[_plain(name)] for name in columns if _plain(name) in own}
+
+
+def _goes_with(name: str, unit: str) -> bool:
+    """True if the quantity of a unit is not another one than the name says."""
+    said, of_unit = label(name).quantity, QUANTITY_OF_UNIT.get(unit_named(unit) or "")
+    return of_unit is not None and said in (of_unit, Quantity.UNKNOWN)
 
 
 def _plain(name: str) -> str:

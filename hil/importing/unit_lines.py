@@ -46,14 +46,17 @@ def _list_of_units(line: str) -> list[str]:
     return []
 
 
-def described(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Words and unit of columns that a line names in turn: "ch2 set [um] | ch3 motor [inc]", "xs set mm, M Nm"."""
+def described(lines: Sequence[str], names: Sequence[str], of_units: bool = False) -> dict[str, tuple[str, str]]:
+    """Words and unit of columns that a line names in turn: "ch2 set [um] | ch3 motor [inc]", "xs set mm, M Nm".
+
+    One alone counts if the line is known to be `of_units`.
+    """
     for line in lines:
         found = {name: re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line) for name in names if name}
         places = sorted((match.start(), match.end(), name) for name, match in found.items() if match)
         ends = [*(start for start, _, _ in places), len(line)][1:]
         told = {name: _words_and_unit(line[begin:end]) for (_, begin, name), end in zip(places, ends, strict=False)}
-        if len(told) > 1 and sum(bool(unit) for _, unit in told.values()) > len(told) / 2:
+        if len(told) > (0 if of_units else 1) and sum(bool(unit) for _, unit in told.values()) > len(told) / 2:
             return told
     each = {name: one for name in names if name for line in lines if (one := _of_one(line, name))}
     return each if len(each) > 1 else {}

@@ -23,8 +23,11 @@ QUANTITY_OF_UNIT = (
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 _ANY_BRACKETS = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]")
 _FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
+_OF_COUNT = re.compile(r"([^\s/]+)(?:\s*/\s*|\s+)(\w+)")
 LEAST_ALONE = 3  # letters of a unit that is a name by itself, or of revolutions: motor_u is a voltage
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
+_OTHER_WORDS = ("in", "rev", "min", "imp")
+_PER = re.compile(r"(?<=\w)[ _]per[ _](?=\w)", re.IGNORECASE)  # m per min
 _SLASH = re.compile(r"^\s*[^/\s]+\s*/\s*(\S+)\s*$")  # DIN 461: x/mm
 _PART_OF = re.compile(r"(?:^|\s)(\S+)\s+(?:of|der|des|vom|du|de la|del|della)\s")
 _WORD_IN = re.compile(r"\bin\s+(\S+)\s*$")  # Weg in mm
@@ -32,7 +35,7 @@ _WORD_IN = re.compile(r"\bin\s+(\S+)\s*$")  # Weg in mm
 
 def unit_named(text: str) -> str | None:
     """Unit of a map for a spelling in a file; None for an unknown one."""
-    key = plain_spelling(text)
+    key = plain_spelling(_PER.sub("/", text))
     if key.startswith("%"):  # % of what is told by no spelling
         return "%"
     unit_of = lexicon().unit_of
@@ -64,8 +67,14 @@ def unit_of_part(text: str) -> str | None:
 
 
 def factor_and_unit(text: str) -> tuple[float, str] | None:
-    """Factor and unit of a text with a number before a unit: 0.1 Nm, 1/100 deg; None for a unit itself."""
+    """Factor and unit of a text with a number before a unit: 0.1 Nm, 1/100 deg, counts of 0.5 um as 0.5um cts.
+
+    None for a unit itself.
+    """
     match = _FACTOR.fullmatch(text.strip(" []()"))
+    of_count = _OF_COUNT.fullmatch(match["unit"]) if match else None
+    if match and of_count and unit_named(of_count[2]) == "counts" and UNITS.get(unit_named(of_count[1]) or ""):
+        match = _FACTOR.fullmatch(match[0][: match.start("unit") + of_count.end(1) - match.start()])
     if not match or unit_named(text.strip(" []()")) is not None or unit_named(match["unit"]) is None:
         return None
     value = float((match["value"] or match["part"]).replace(",", "."))
@@ -95,6 +104,24 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
             if unit and unit != "min" and not (unit == "rev" and len(tokens[-1]) < LEAST_ALONE):
                 return "_".join(tokens[:-take]), unit, False
     return name, None, False
+
+
+def unit_within(name: str, quantity: Quantity) -> str | None:
+    """Unit of a `quantity` that is a word within a name, between others: mot_pos_deg_joint; None without one, or two.
+
+    One letter, "in" and "rev" (reverse) are words of other meaning there.
+    """
+    tokens = [token.lower() for token in re.split(r"[\s_.\-]+", name) if token]
+    found = set[str]()
+    for take in (2, 1):
+        for begin in range(1, len(tokens) - take + 1):
+            text = "_".join(tokens[begin : begin + take])
+            unit = unit_named(text.replace("°", "deg"))
+            if unit and text not in _OTHER_WORDS and len(text) > 1 and QUANTITY_OF_UNIT.get(unit) is quantity:
+                found.add(unit)
+        if found:
+            break
+    return found.pop() if len(found) == 1 else None
 
 
 def whole_unit(name: str) -> str | None:

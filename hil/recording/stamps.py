@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.errors import InputError
+from hil.errors import InputError, RateNeeded
 from hil.files.input_file import MOST_VALUES
 from hil.recording.clock_notes import LEAST_ROWS, of_gaps, of_ticks, of_uneven
 from hil.recording.row_clock import (
@@ -186,9 +186,8 @@ def _refuse_order(time_s: FloatArray, steps: FloatArray, few_digits: bool, place
     falls, usual = steps[steps < 0.0], float(np.median(np.abs(steps)))
     again = back > 1 and np.ptp(falls) < GAP_STEPS * usual and -falls.max() > GAP_STEPS * usual
     if time_s.min() == time_s.max():
-        problem = f"the stamps are all {time_s[0]:g} s"
-        advice = "say the rate of the rows: hil import FILE --rate HZ"
-    elif not steps[row - 1]:
+        raise RateNeeded(f"{place(row)}: the stamps are all {time_s[0]:g} s")
+    if not steps[row - 1]:
         problem = "repeats (a duplicate row, or stamps with too few digits)"
     elif again:
         problem = f"runs back by {-np.median(falls):.6g} s in {back} places"

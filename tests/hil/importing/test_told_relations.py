@@ -1,0 +1,101 @@
+"""Two encoders are no set-point and its motion; ratios that columns tell; steppers; loggers of one run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import axis, csv_text
+
+from hil.errors import InputError, PartOfAxis
+from hil.explanation import explain
+from hil.importing.draft_map import draft_map
+from hil.importing.map_draft import MapDraft
+from hil.importing.own_units import take_own_units
+
+AXIS = axis(4000)
+T, TORQUE, RPM = AXIS["t"], AXIS["torque"], AXIS["speed"] * 30 / np.pi
+NOISE = np.random.default_rng(5).normal(0.0, 1.0, (2, T.size))
+
+
+def drafted(path: Path, columns: dict[str, np.ndarray]) -> MapDraft:
+    path.write_text(csv_text({"t_s": T} | columns))
+    return draft_map(path)
+
+
+def column_of(draft: MapDraft, channel: str) -> object:
+    return next(one.entry["column"] for one in draft.channels if one.channel == channel)
+
+
+@pytest.mark.parametrize(
+    ("motor", "load"),
+    [("enc1_mm", "enc2_mm"), ("Geber 2 [mm]", "Geber 1 [mm]"), ("x2_mm", "x1_mm"), ("codeur2_mm", "codeur1_mm")],
+)
+def test_two_encoders_are_no_set_point_with_less_noise(tmp_path: Path, motor: str, load: str) -> None:
+    fine = AXIS["x_act"] + 1e-5 * NOISE[0]
+    soft = np.interp(T - 0.006, T, AXIS["x_act"]) + 3e-3 * NOISE[1]
+    draft = drafted(tmp_path / "log.csv", {load: soft, motor: fine, "n_rpm": RPM, "M_Nm": TORQUE})
+    assert column_of(draft, "motor_position_rad") == motor
+    assert column_of(draft, "table_position_m") == load
+    assert any("exchange them if not" in note for note in draft.unsure)
+
+
+def test_the_first_encoder_is_the_motors_where_nothing_tells(tmp_path: Path) -> None:
+    one, other = (AXIS["x_act"] + 1e-4 * noise for noise in NOISE)
+    draft = drafted(tmp_path / "log.csv", {"enc2_mm": one, "enc1_mm": other, "M_Nm": TORQUE})
+    assert column_of(draft, "motor_position_rad") == "enc1_mm"
+
+
+@pytest.mark.parametrize("gear", [37.0, 2.5])
+def test_a_speed_of_the_motor_tells_the_gear_to_an_angle_of_the_load(tmp_path: Path, gear: float) -> None:
+    table = np.rad2deg(AXIS["angle"]) / gear
+    draft = drafted(tmp_path / "log.csv", {"phi_Tisch_Grad": table, "n_Mot_Upm": RPM, "M_Nm": TORQUE})
+    (entry,) = (one.entry for one in draft.channels if one.channel == "motor_position_rad")
+    assert entry["scale"] == pytest.approx(gear, rel=2e-3)
+    assert any("from column n_Mot_Upm" in note for note in draft.unsure)
+
+
+def test_a_speed_of_the_same_shaft_is_no_gear(tmp_path: Path) -> None:
+    draft = drafted(tmp_path / "log.csv", {"phi_Grad": np.rad2deg(AXIS["angle"]), "n_Upm": RPM, "M_Nm": TORQUE})
+    assert "scale" not in draft.channels[0].entry
+
+
+def test_a_speed_in_turns_beside_a_length_tells_a_screw_of_a_current(tmp_path: Path) -> None:
+    columns = {"hub [um]": 1e3 * AXIS["x_act"], "n [deg/s]": 6.0 * RPM, "Iq [A]": TORQUE}
+    draft = drafted(tmp_path / "log.csv", columns)
+    assert draft.lead_m == 0.010
+    assert "n [deg/s]" in draft.lead_how
+    assert {one.key for one in draft.asked} == {"torque_constant_n_m_a"}
+
+
+STEPS = np.round(AXIS["angle"] / (2 * np.pi) * 6400)
+
+
+@pytest.mark.parametrize(("command", "encoder"), [("CMD", "ENC"), ("Schritte", "Geber"), ("steps", "enc_steps")])
+def test_steps_that_an_encoder_follows_are_the_motion(tmp_path: Path, command: str, encoder: str) -> None:
+    counts = np.round(AXIS["angle"] / (2 * np.pi) * 2400) + 512
+    draft = drafted(tmp_path / "log.csv", {command: STEPS, encoder: counts})
+    assert column_of(draft, "motor_position_rad") == command
+    assert column_of(draft, "table_position_m") == encoder
+    asked = [(one.channel, one.key) for one in draft.asked]
+    assert asked == [("motor_position_rad", "counts_per_rev"), ("table_position_m", "counts_per_rev")]
+    assert f"write 0.375 times that of {command}" in draft.asked[1].what
+    take_own_units(draft)
+    motor, table = (float(str(one.entry["counts_per_rev"])) for one in draft.channels)
+    assert table / motor == pytest.approx(0.375)
+
+
+def test_a_set_point_in_the_counts_of_the_encoder_is_none_of_a_stepper(tmp_path: Path) -> None:
+    counts = np.roll(STEPS, 3)
+    with pytest.raises(PartOfAxis, match=r"no torque.*another file of the same run"):
+        drafted(tmp_path / "log.csv", {"CMD": STEPS, "ENC": counts})
+
+
+def test_two_loggers_of_one_run_are_named(tmp_path: Path) -> None:
+    one, other = tmp_path / "gather.csv", tmp_path / "scope.csv"
+    one.write_text(csv_text({"t_s": T, "x_mm": AXIS["x_act"]}))
+    other.write_text(csv_text({"t_s": T, "torque_Nm": TORQUE}))
+    for paths in ([one, other], [other, one]):
+        with pytest.raises(InputError, match=r"look like loggers of one run: join them by time into one file"):
+            explain(paths, tmp_path / "out")

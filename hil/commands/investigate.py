@@ -127,6 +127,10 @@ def investigate(
     )
     out.print(f"\n{found.diagnosis.result.statement}\n\n{found.ended}\n\n{page_line(folder / 'report.html')}")
     if compensate:
+        if simulation is None:
+            err.print(
+                "Each motion of --validate is run twice without a compensation, once with it, once without each table."
+            )
         if not all(allowed(profile) for profile in proving.values()):
             out.print("The compensation was not tried: it was not confirmed.")
             return

@@ -68,6 +68,8 @@ def label(term: Term, bench: Bench) -> str:
 
 def wave(order: float, bench: Bench, error: float = 0.0) -> str:
     """How often an effect repeats: per revolution, or along the travel where no revolution is known."""
+    if bench.axis.physics().turn_known and order < 1.0:  # of a pulley or wheel behind the motor
+        return f"once in {known_quantity(1.0 / order, error / order**2, '')} revolutions"
     if bench.axis.physics().turn_known:
         return f"{known_quantity(order, error, '1/rev')} times per revolution"
     return f"every {known_quantity(1.0 / order, error / order**2, 'm')} of travel"

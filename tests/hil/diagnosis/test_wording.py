@@ -8,7 +8,7 @@ from hil.diagnosis.result import AT_FLOOR, Location, Result
 from hil.diagnosis.sentence import sentence
 from hil.diagnosis.statement import explained, statement
 from hil.diagnosis.turning import of_load
-from hil.diagnosis.wording import spoken, where
+from hil.diagnosis.wording import spoken, wave, where
 from hil.identification.terms import Term
 from hil.twin.library import LIBRARY
 
@@ -148,3 +148,8 @@ def test_a_finding_that_is_not_likely_is_called_doubtful() -> None:
 )
 def test_a_channel_is_named_without_its_unit(channel: str, words: str) -> None:
     assert spoken(channel) == words
+
+
+def test_what_turns_slower_than_the_motor_repeats_once_in_some_revolutions() -> None:
+    assert wave(12.0, load_bench("reference"), 1e-3) == "12.0 times per revolution"
+    assert wave(0.497, load_bench("reference"), 2e-3) == "once in 2.01 revolutions"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,13 +20,15 @@ from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of
 from hil.control.compensation_tables import Adds, CompensationTable
 from hil.diagnosis.result import Result
 from hil.errors import HilError
-from hil.loop.run import RunResult
 from hil.motion.profile import Profile
 from hil.motion.trajectory import plan
 from hil.quantities import quantity
 from hil.recording.recording import Recording, read_recording
 
-RunBench = Callable[[Bench, Profile, Path, str], RunResult]  # bench, profile, folder, name of the recording
+if TYPE_CHECKING:
+    from hil.loop.run import RunResult
+
+RunBench = Callable[[Bench, Profile, Path, str], "RunResult"]  # bench, profile, folder, name of the recording
 _KINDS = {Adds.TORQUE: "following", Adds.POSITION: "positioning"}
 
 

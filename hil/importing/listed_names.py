@@ -19,7 +19,10 @@ class ListedNames:
 
 
 def listed_names(lines: Sequence[str], delimiter: str, width: int) -> ListedNames | None:
-    """Names of `width` columns, numbered from 0 or 1 in turn and all different; None without such a list."""
+    """Names of `width` columns, numbered from 0 or 1 in turn and all different; None without such a list.
+
+    A row that has such numbers in its fields gives the names itself.
+    """
     words = "|".join(lexicon().enumerated)
     place = re.compile(
         rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)]", re.IGNORECASE
@@ -28,7 +31,7 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int) -> ListedName
     for index, line in enumerate(lines):
         found = list(place.finditer(line))
         if len(found) == width == len(split_line(line, delimiter)):
-            continue  # a row of names: Ch1 pos;Ch2 torque
+            return None  # a row of names, Ch1;Ch2: `unit_lines` reads what lines above say of them
         for number, match in enumerate(found):
             end = found[number + 1].start() if number + 1 < len(found) else len(line)
             name = line[match.end() : end].strip(_ENDS)

@@ -89,8 +89,10 @@ class Dependence:
             return f"{what} throughout ({by_chance(found.p)})"
         moving = ""
         if question.by_direction:
-            moving = " moving up" if low >= question.by_direction else " moving down"
-            low, high = (min(one, question.by_direction * 2.0) % question.by_direction for one in (low, high))
+            # a range may cover the end of one way and the begin of the other
+            up = low + high >= 2.0 * question.by_direction
+            begin, moving = (question.by_direction, " moving up") if up else (0.0, " moving down")
+            low, high = (min(max(one - begin, 0.0), question.by_direction) for one in (low, high))
         factor, unit = reading_unit(question.unit, max(abs(low), abs(high)))
         return (
             f"{what} at a {question.name} of {digits(factor * low)} to {digits(factor * high)} {unit}{moving} "

@@ -13,6 +13,7 @@ from hil.commands.options import Force, Out, RunBench, Seed, Virtual
 from hil.report.console import err, out, progress, table
 
 if TYPE_CHECKING:
+    from hil.bench.bench_file import Bench
     from hil.loop.run import RunResult
     from hil.motion.profile import Profile
 
@@ -105,7 +106,7 @@ def investigate(
         return ran
 
     def allowed(profile: Profile) -> bool:
-        return simulation is not None or yes or _confirmed(profile, loaded.gains.period_s)
+        return simulation is not None or yes or _confirmed(profile, loaded)
 
     compile_kernels()
     found = investigate_bench(first, proving, loaded, folder, run, allowed, progress, rounds)
@@ -155,16 +156,18 @@ def investigate(
             out.print(f"Bench: {folder / 'bench.compensated.yaml'}")
 
 
-def _confirmed(profile: Profile, period_s: float) -> bool:
-    """Ask whether a designed motion may be run on a real axis; False without a terminal."""
+def _confirmed(profile: Profile, bench: Bench) -> bool:
+    """Ask whether a motion may be run on a real axis; False without a terminal."""
     from hil.motion.trajectory import plan
+    from hil.quantities import quantity
 
     if not sys.stdin.isatty():
         return False
-    trajectory, limits = plan(profile, period_s), profile.limits
+    trajectory, limits = plan(profile, bench.gains.period_s), profile.limits
+    unit = "rad" if bench.axis.turns else "m"
+    places = (quantity(float(one), unit) for one in (trajectory.position_m.min(), trajectory.position_m.max()))
     err.print(
-        f"Next motion: {profile.description}, {trajectory.duration_s:.1f} s, from "
-        f"{1e3 * trajectory.position_m.min():.1f} to {1e3 * trajectory.position_m.max():.1f} mm, up to "
-        f"{limits.velocity_m_s:g} m/s, {limits.acceleration_m_s2:g} m/s^2, {limits.jerk_m_s3:g} m/s^3."
+        f"Next motion: {profile.description}, {trajectory.duration_s:.1f} s, from {' to '.join(places)}, up to "
+        f"{limits.velocity_m_s:g} {unit}/s, {limits.acceleration_m_s2:g} {unit}/s^2, {limits.jerk_m_s3:g} {unit}/s^3."
     )
     return typer.confirm("Run it on this bench?", default=False, err=True)

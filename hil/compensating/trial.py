@@ -1,7 +1,8 @@
 """Try a compensation on the bench: errors of motions before, as predicted, and after; what does not help is left out.
 
-Each motion is run twice as the axis is: the difference of the two is what a repetition changes. An entry is kept if the
-error that it is for is larger without it by more than that. So a wrong or an old table costs runs, and no accuracy.
+Each motion is run twice without any compensation: the difference of the two is what a repetition changes. An entry is
+kept if the error that it is for is larger without it by more than that. So a wrong or an old table costs runs, and no
+accuracy.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.bench.hardware import DriveMode
 from hil.compensating.compensate import DRAWS, Plan, plan_compensation, section_of
 from hil.compensating.derive import Derived
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of
@@ -68,7 +70,9 @@ class Trial:
         if self.plan.harms:
             return f"Nothing was run: by the twin {'; '.join(self.plan.harms)}."
         if self.section is None:
-            return "Nothing is kept: no table improved its error by more than a repetition changes it."
+            return (
+                "Nothing is kept: no table could be tried and improved its error by more than a repetition changes it."
+            )
         parts = []
         for adds in dict.fromkeys(table.adds for table in self.plan.compensation.tables):
             before, after = (rms([pair[index] for pair in self.pairs(adds)]) for index in (0, 1))
@@ -97,7 +101,7 @@ def error_series(recording: Recording, bench: Bench, fade_in_s: float) -> tuple[
     As `prediction.errors_of` has those of the twin; without a linear encoder the table is where the motor is.
     """
     ratio, first = bench.axis.ratio_m_rad, round(fade_in_s / bench.period_s)
-    command, motor = recording["position_command_m"], ratio * recording["motor_position_rad"]
+    command, motor = recording["position_command_m"], ratio * recording[recording.axis.motor_position]
     table = recording.columns.get("table_position_m", motor)
     added = recording.columns.get("compensation_position_m", np.zeros(len(recording)))
     fed_back = table if bench.gains.position_from_table else motor - motor[0] + command[0]
@@ -127,11 +131,17 @@ def try_compensation(
     """
     bench = diagnosed.model_copy(update={"compensation": None})
     motions = {name: plan(profile, bench.period_s) for name, profile in profiles.items()}
+    for name, motion in motions.items():
+        if motion.duration_s <= 2.0 * fade_in_s:
+            raise HilError(
+                f"{name}: given {motion.duration_s:.3g} s of motion, allowed more than {2.0 * fade_in_s:g} s"
+            )
     widest = max(motions.values(), key=lambda one: float(np.abs(one.velocity_m_s).max()))
     made = plan_compensation(bench, widest, result, fade_in_s)
     unit = "rad" if bench.axis.turns else "m"
-    if made.harms:
-        return Trial(None, made, (), made.derived.left_out, fade_in_s, unit)
+    made, untried = _that_can_be_tried(given, made)
+    if made.harms or not made.compensation.tables:
+        return Trial(None, made, (), (*made.derived.left_out, *untried), fade_in_s, unit)
 
     def errors(tried: Bench, label: str) -> dict[str, tuple[Errors, Recording]]:
         found = {}
@@ -145,7 +155,7 @@ def try_compensation(
 
     plain = given.model_copy(update={"compensation": None})
     before = errors(plain, "before"), errors(plain, "before_again")
-    tables, dropped = list(made.compensation.tables), list[tuple[str, str]]()
+    tables, dropped = list(made.compensation.tables), list(untried)
     after = errors(_with(plain, made, tables), "after")
     for table in made.compensation.tables:
         rest = [one for one in tables if one is not table]
@@ -153,7 +163,7 @@ def try_compensation(
         worse = rms([one.of(table.adds) for one, _ in without.values()])
         noise = max(abs(before[0][name][0].of(table.adds) - before[1][name][0].of(table.adds)) for name in profiles)
         own = rms([one.of(table.adds) for one, _ in after.values()])
-        if worse - own <= noise:
+        if not worse - own > noise:
             tables, after = rest, without
             kind = _KINDS[table.adds]
             dropped.append((table.name, f"{kind} error {quantity(own, unit)} with it, {quantity(worse, unit)} without"))
@@ -171,6 +181,20 @@ def try_compensation(
     ]
     section = _section(plain, kept) if tables else None
     return Trial(section, kept, tuple(tried), (*made.derived.left_out, *dropped), fade_in_s, unit)
+
+
+def _that_can_be_tried(given: Bench, made: Plan) -> tuple[Plan, list[tuple[str, str]]]:
+    """The plan with the tables that the drive takes and a run can judge, and why not the others."""
+    in_drive = given.drive is not None and given.drive.mode is not DriveMode.CST
+    tables, untried = list[CompensationTable](), list[tuple[str, str]]()
+    for table in made.compensation.tables:
+        if table.adds is Adds.TORQUE and in_drive:
+            untried.append((table.name, "a torque is added to the command of a drive in cst only"))
+        elif table.adds is Adds.POSITION and given.encoders.table is None:
+            untried.append((table.name, "without a linear encoder no run tells where the table is"))
+        else:
+            tables.append(table)
+    return replace(made, derived=_only(made.derived, tables)), untried
 
 
 def _only(derived: Derived, tables: Sequence[CompensationTable]) -> Derived:

@@ -7,6 +7,7 @@ from hil.importing.stamp_columns import counted_on, range_of
 
 COUNTER = "rises by the same step from row to row: a counter or a clock, no channel of the motion"
 _SAME_STEP = 1e-6  # of the largest value: the rounding of printed digits; no motion is as even
+_EVEN = 0.01  # of a step, at most: beside a large first value the rounding says nothing
 _LOST = 0.05  # most steps that are multiples of the usual one, where rows are missing
 
 
@@ -29,6 +30,7 @@ def rises_evenly(values: FloatArray) -> bool:
     if usual <= 0.0:
         return False
     multiples = steps / usual
-    whole = np.abs(multiples - np.round(multiples)) * usual <= _SAME_STEP * float(np.abs(values).max())
+    rounding = min(_SAME_STEP * float(np.abs(values).max()), _EVEN * usual)
+    whole = np.abs(multiples - np.round(multiples)) * usual <= rounding
     again = np.round(multiples) == 1.0
     return bool(np.all(whole) and np.all(multiples > 0.5) and np.mean(~again) <= _LOST)

@@ -90,6 +90,8 @@ def _last_turn(place: FloatArray, feed: FloatArray, curvature: FloatArray) -> sl
     dx, dy = place[0] - circle.x_m, place[1] - circle.y_m
     exact = np.abs(np.hypot(dx, dy) / circle.radius_m - 1.0) < EXACT
     first, last = _longest(steady & exact, around=(first + last) // 2)
+    if last - first < LEAST_ROWS:
+        return None
     angle = np.unwrap(np.arctan2(dy[first:last], dx[first:last]))
     whole = np.flatnonzero(np.abs(angle - angle[-1]) > 2.0 * np.pi)
     return slice(first + int(whole[-1]) + 1, last) if whole.size else None

@@ -83,3 +83,23 @@ def test_a_run_that_stops_ends_the_trial(tmp_path: Path) -> None:
     data["drive"]["following_error_m"] = 1e-6
     with pytest.raises(HilError, match="move_before stopped"):
         tried(tmp_path, diagnosed(), Bench.model_validate(data))
+
+
+def never(bench: Bench, profile: Profile, place: Path, name: str) -> RunResult:
+    raise AssertionError(name)
+
+
+def test_what_the_drive_or_the_encoders_do_not_allow_costs_no_run(tmp_path: Path) -> None:
+    data = bench_of_effects().model_dump(mode="json")
+    data["drive"]["mode"], data["encoders"]["table"] = "csp", None
+    bench = Bench.model_validate(data)
+    trial = try_compensation(bench, diagnosed(), TOLD, {"move": MOTION}, tmp_path, never, FADE_S)
+    assert trial.section is None
+    reasons = dict(trial.left_out)
+    assert "cst only" in reasons["torque over angle"]
+    assert "linear encoder" in reasons["set-point over angle"]
+
+
+def test_a_motion_that_ends_before_the_fade_in_is_refused_before_any_run(tmp_path: Path) -> None:
+    with pytest.raises(HilError, match=r"given .* s of motion"):
+        try_compensation(bench_of_effects(), diagnosed(), TOLD, {"move": MOTION, "short": MOTION}, tmp_path, never, 5.0)

@@ -45,13 +45,13 @@ class TriedMotion:
     recordings: tuple[Recording, Recording]
 
     def noise_m(self, adds: Adds) -> float:
-        """What a repetition of the motion changes of an error."""
-        return abs(self.before[0].of(adds) - self.before[1].of(adds))
+        """How far an error differs between the two runs before."""
+        return _repetition_m(self.before, adds)
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What was tried on a bench: the plan with the tables that are kept, and the section of the bench file with them.
+    """Result of a trial: the plan with the tables that are kept, and the section `compensation` that holds them.
 
     `section` is None where none is kept. `left_out`: name of a table or effect and why. `fade_in_s`: rows before are in
     no error. `unit`: of positions.
@@ -88,6 +88,10 @@ class Trial:
         """Smallest and largest predicted share of an error that is left, over motions and draws."""
         shares = [motion.predicted.interval(adds) for motion in self.motions]
         return min(low for low, _ in shares), max(high for _, high in shares)
+
+
+def _repetition_m(before: tuple[Errors, Errors], adds: Adds) -> float:
+    return abs(before[0].of(adds) - before[1].of(adds))
 
 
 def rms(values: Sequence[float]) -> float:
@@ -161,7 +165,7 @@ def try_compensation(
         rest = [one for one in tables if one is not table]
         without = errors(_with(plain, made, rest), f"without_{table.name.replace(' ', '_')}") if rest else before[0]
         worse = rms([one.of(table.adds) for one, _ in without.values()])
-        noise = max(abs(before[0][name][0].of(table.adds) - before[1][name][0].of(table.adds)) for name in profiles)
+        noise = max(_repetition_m((before[0][name][0], before[1][name][0]), table.adds) for name in profiles)
         own = rms([one.of(table.adds) for one, _ in after.values()])
         if not worse - own > noise:
             tables, after = rest, without

@@ -1,4 +1,4 @@
-"""What a finding improves, in words: a residual that was above its noise, else what the result holds below it."""
+"""Sentence on what a finding improves: the residual of a channel that was above its noise, else the torque left."""
 
 from hil.diagnosis.ledger import SHAPE
 from hil.diagnosis.result import FitFigures, Result

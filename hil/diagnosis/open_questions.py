@@ -1,4 +1,4 @@
-"""What recordings leave open, in words: causes that they do not separate, and mechanisms that they cannot show."""
+"""Sentences on open questions: causes that the recordings do not separate, mechanisms that the motion cannot show."""
 
 from hil.diagnosis.result import Result, Verdict
 from hil.diagnosis.wording import listed, title, titles

@@ -119,7 +119,7 @@ def _left(result: Result) -> str:
 
 
 def _unexplained(result: Result) -> str:
-    """What a twin without a name for it leaves: residuals above the noise, else what is below the noise of a row."""
+    """Describe a mismatch without a name: residuals above the noise, else the structure below the noise of a row."""
     if result.unexplained.description != AT_FLOOR:
         return f": {result.unexplained.description}{_depends(result)}"
     if result.structure:

@@ -1,4 +1,4 @@
-"""What a writer for a controller gets, and what it gives."""
+"""Input and output of the writers of controller files."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -8,9 +8,9 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.compensating.controllers.controller_task import ControllerTask, NotTaken
+from hil.compensating.shapes import NEAR
 from hil.control.compensation_tables import Adds, CompensationTable, Over
 
-NEAR = 0.02  # of the rms of the correction: what the lines between points may leave; as in hil.compensating.shapes
 USELESS = 0.5  # a table that leaves half of the correction is none
 SAME_M = 1e-9  # below this, values are equal: no encoder of a machine tool tells them apart
 STEP_M = 1e-9  # points are multiples of it, so that the digits of a file give them exactly

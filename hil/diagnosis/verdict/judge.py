@@ -49,7 +49,8 @@ def judge(tested: Tested) -> Judged:
     verdict = law.verdict(of_plant)
     is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
-        final = searched.given if given_stands(searched.given, held_out) else refit.fit
+        as_given = of_plant is Verdict.NO_MISMATCH and given_stands(searched.given, held_out)
+        final = searched.given if as_given else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
     left = structure_left(final, held_out)

@@ -7,7 +7,7 @@ hypothesis does not reproduce a recording.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -31,9 +31,9 @@ from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
 from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
-from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
+from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin, taken_back
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Contact
+from hil.twin.mechanism import Contact, Stage
 from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.physics import Active
 
@@ -71,7 +71,9 @@ class Hypothesis:
 
     def moved(self, x: FloatArray) -> "Hypothesis":
         """The same mechanisms at another point x (p,)."""
-        return replace(self, x=x)
+        there = replace(self, x=x)
+        vars(there).update(coordinates=self.coordinates, _known=self._known)  # alike at every point
+        return there
 
     def with_term(self, term: Term) -> "Hypothesis":
         """The hypothesis with one more term, at that term's values."""
@@ -240,9 +242,8 @@ class Hypothesis:
 
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
-        channels, periods = twin.undelayed(run.response), (self.resolved.bench.torque_delay_s or 0.0) / run.period_s
-        command, torque = (delayed(part, periods) for part in (channels.torque_command, channels.torque))
-        return channels._replace(torque_command=command, torque=torque) if periods else channels
+        late = tuple(one for one in twin.active if one.form.stage is Stage.CHANNEL)
+        return _undelayed(run, late, (self.resolved.bench.torque_delay_s or 0.0) / run.period_s)
 
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
@@ -283,3 +284,13 @@ class Hypothesis:
                 channels = [self.blocks(run, data.observer_s, fast) for run in runs]
             self._done[key] = Residuals(data, tuple(channels))
         return self._done[key]
+
+
+@lru_cache(maxsize=32)  # most parameters of a fit leave the lateness as it is
+def _undelayed(run: Measured, late: tuple[Active, ...], torque_periods: float) -> Response:
+    """Measured channels without the lateness that mechanisms, and a delay of the torque in rows, give them."""
+    channels = taken_back(run.response, late, run.period_s)
+    if not torque_periods:
+        return channels
+    command, torque = (delayed(part, torque_periods) for part in (channels.torque_command, channels.torque))
+    return channels._replace(torque_command=command, torque=torque)

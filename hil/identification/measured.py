@@ -74,7 +74,7 @@ class Measured:
         """
         return np.asarray(np.abs(np.diff(self.torque_command, append=self.torque_command[-1])) / np.sqrt(12.0))
 
-    @property
+    @cached_property
     def time_s(self) -> FloatArray:
         """Time from the first row of the whole recording, tick x period."""
         return np.asarray(self.start.time_s + np.arange(self.motor.size) * self.period_s, dtype=np.float64)

@@ -108,8 +108,11 @@ class Residuals:
 
 def _bounded(values: FloatArray, scale: FloatArray) -> FloatArray:
     """Values (n,) over their scale, finite also for an unstable hypothesis."""
-    with np.errstate(over="ignore"):
-        return np.clip(np.nan_to_num(values / scale, nan=_LOST), -_LOST, _LOST)
+    with np.errstate(over="ignore", invalid="ignore"):
+        ratio = values / scale
+        if np.isnan(ratio @ ratio):
+            ratio[np.isnan(ratio)] = _LOST
+        return np.clip(ratio, -_LOST, _LOST, out=ratio)
 
 
 def datum_m(measured: Response, simulated: Response, ratio_m: float, evaluated: slice) -> float:

@@ -1,5 +1,7 @@
 """Rows of a recording at which the motor rests, as far as its encoder tells."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
@@ -10,6 +12,7 @@ CREEP_S = 0.008  # time constant of the slowest observer
 _SIGMAS = 3.0  # of the noise of a difference: a row in a thousand at rest seems to move
 
 
+@lru_cache(maxsize=32)  # alike for all hypotheses of an axis
 def resting(run: Measured, slow: float) -> NDArray[np.bool_]:
     """Rows (n,) at which the motor rests: its speed is below `slow` [motor units / s]; `creeping` if it is coarse.
 

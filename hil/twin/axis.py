@@ -20,7 +20,7 @@ from hil.twin.stepping import loops
 from hil.twin.stepping.records import Arrays, Axis, pack, start_memory
 from hil.twin.stepping.static_equilibrium import settle
 from hil.twin.structure.chain import Chain
-from hil.twin.structure.modal import Modal, modal, truncate
+from hil.twin.structure.modal import Modal, lowest_modes
 
 # Internal steps. Fine: the friction impulse of the step in which the motor reverses is right to Fc x 20 us, 0.003 N m
 # of velocity-loop torque on the reference axis, below its current noise. Coarse: sliding friction is constant over a
@@ -85,8 +85,7 @@ class Twin:
     @cached_property
     def modal(self) -> Modal:
         """Modes of the chain."""
-        modes = modal(self.chain)
-        return modes if self.modes is None else truncate(modes, self.modes)
+        return lowest_modes(self.chain, self.modes)
 
     @cached_property
     def _arrays(self) -> Arrays:
@@ -94,7 +93,7 @@ class Twin:
             max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
             for longest_s in (self.coarse_step_s, self.fine_step_s)
         )
-        arrays = pack(self.physics, self.chain, self.modal, self.gains, self.active, (coarse, fine), self.observer_s)
+        arrays = pack(self.physics, self.chain, self.modes, self.gains, self.active, (coarse, fine), self.observer_s)
         arrays.constants["any_active"] |= self.push_n.size > 0
         return arrays
 
@@ -199,7 +198,7 @@ class Twin:
 
     def undelayed(self, measured: Response) -> Response:
         """Undo the lateness that active mechanisms give to measured inputs."""
-        return self._recorded(measured, (Stage.CHANNEL,), -1.0)
+        return taken_back(measured, self.active, self.gains.period_s)
 
     def _axis(self, start: Start) -> Axis:
         return Axis(*self.arrays(), *self.state(start))
@@ -210,12 +209,20 @@ class Twin:
             start.position_m / ratio, start.velocity_m_s / ratio, start.torque, self.gains.period_s, start.tick
         )
 
-    def _recorded(
-        self, response: Response, stages: Sequence[Stage] = (Stage.CHANNEL, Stage.ANSWER), times: float = 1.0
-    ) -> Response:
-        """Apply active mechanisms of the recording to the channels, with their parameters multiplied."""
-        for active in self.active:
-            if active.form.stage in stages:
-                values = tuple(times * value for value in active.values)
-                response = Response(*active.form.contribution(tuple(response), values, self.gains.period_s))
-        return response
+    def _recorded(self, response: Response, stages: Sequence[Stage] = (Stage.CHANNEL, Stage.ANSWER)) -> Response:
+        return _recorded(response, self.active, stages, self.gains.period_s)
+
+
+def _recorded(
+    response: Response, active: Sequence[Active], stages: Sequence[Stage], period_s: float, times: float = 1.0
+) -> Response:
+    """Apply mechanisms of the recording to the channels, with their parameters multiplied."""
+    for one in active:
+        if one.form.stage in stages:
+            response = Response(*one.form.contribution(tuple(response), [times * v for v in one.values], period_s))
+    return response
+
+
+def taken_back(measured: Response, active: Sequence[Active], period_s: float) -> Response:
+    """Undo the lateness that mechanisms give to measured inputs."""
+    return _recorded(measured, active, (Stage.CHANNEL,), period_s, -1.0)

@@ -6,6 +6,7 @@ mechanisms.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from hil.twin.physics import Active, Physics
 from hil.twin.stepping.contact import ELEMENTS
 from hil.twin.stepping.stages import KERNEL_STAGES
 from hil.twin.structure.chain import Chain
-from hil.twin.structure.modal import Discrete, Modal, discretise
+from hil.twin.structure.modal import Discrete, Modal, discretise, lowest_modes
 
 _ROUNDING = 1e-12  # of all damping: below, a whole axis as one side has only rounding of it
 # The step is fine while motor or table moves slower than this, or could reverse within two ticks; the axis then rests
@@ -119,23 +120,19 @@ def start_memory() -> NDArray[np.void]:
 def pack(
     physics: Physics,
     chain: Chain,
-    modes: Modal,
+    modes: int | None,
     gains: cascade.Gains,
     active: Sequence[Active],
     steps: tuple[int, int],
     observer_s: float,
 ) -> Arrays:
-    """Pack a twin; `chain`: with the changes by mechanisms; `steps`: coarse and fine ones per tick.
+    """Pack a twin; `chain`: with the changes by mechanisms; `modes`: the lowest ones kept; `steps`: coarse and fine
+    ones per tick.
 
     Raises ValueError where a mechanism acts more often than it may.
     """
     values, codes = _pack_mechanisms(active)
-    coarse, fine = (discretise(modes, gains.period_s / number) for number in steps)
-    modal_damping = np.diag(2.0 * modes.damping_ratio * modes.frequency_rad_s)
-    given = chain.damping_n_m_s_rad
-    damping = modal_damping if given is None else modes.shape.T @ given @ modes.shape
-    shapes = _pack_shapes(physics.chain, chain, modes, damping)
-
+    packed = _pack_modes(physics.chain, chain, modes, gains.period_s, steps)
     constants = np.zeros(1, CONSTANTS)
     c = constants[0]
     c["period"], c["ratio"], c["observer"] = gains.period_s, gains.ratio_m_rad, observer_s
@@ -146,23 +143,59 @@ def pack(
     c["screw"] = physics.chain.screw_stiffness_n_m_rad
     c["rigid"] = not physics.chain.transmission.any()
     c["screw_apart"] = not np.array_equal(physics.chain.screw, physics.chain.transmission)
-    # s^T C s: resists the two sides of the transmission moving apart as two bodies. Play removes it; for a lead error
-    # the table's place with the error counts. The rest of the damping drives no mode.
-    c["damper"] = -shapes.damper @ shapes.table_side
+    c["damper"], c["coarse"], c["fine"] = packed.damper, packed.coarse, packed.fine
     for contact in Contact:
         c[contact.value] = any(one.form.contact is contact for one in active)
-    c["coupled"] = given is not None
+    c["coupled"] = chain.damping_n_m_s_rad is not None
     c["any_active"] = c["coupled"] or codes["slots"].any()
     # a spring's change beside the modes is held over a step, and modes of a long chain are faster than a coarse one
-    c["always_fine"] = any(BY_ID[one.effect].softens for one in active) and np.count_nonzero(shapes.spring[1:]) > 1
+    c["always_fine"] = any(BY_ID[one.effect].softens for one in active) and packed.springs > 1
+    return Arrays(constants, packed.rows, values, codes)
+
+
+class _PackedModes(NamedTuple):
+    """Modes as the kernels take them: `rows` (20 + n, n), and what a mechanism or a step does to them.
+
+    `damper` is the damping against the sides of the transmission moving apart, `springs` the number of elastic modes
+    that deflect it; `coarse` and `fine` are records of a step.
+    """
+
+    rows: FloatArray
+    damper: float
+    springs: int
+    coarse: tuple[float, ...]
+    fine: tuple[float, ...]
+
+
+@lru_cache(maxsize=256)
+def _pack_modes(
+    own: Chain, chain: Chain, number: int | None, period_s: float, steps: tuple[int, int]
+) -> _PackedModes:
+    """Pack the modes of a chain; `own`: the chain without the coordinates that mechanisms add after its own."""
+    modes = lowest_modes(chain, number)
+    coarse, fine = (discretise(modes, period_s / each) for each in steps)
+    modal_damping = np.diag(2.0 * modes.damping_ratio * modes.frequency_rad_s)
+    given = chain.damping_n_m_s_rad
+    damping = modal_damping if given is None else modes.shape.T @ given @ modes.shape
+    shapes = _pack_shapes(own, chain, modes, damping)
     motor, table = shapes.motor, shapes.table
-    for name, number, step in (("coarse", steps[0], coarse), ("fine", steps[1], fine)):
-        c[name] = (number, motor * step.b2 @ motor, motor * step.b2 @ table, table * step.b2 @ table)
-    return Arrays(constants, np.vstack([*coarse, *fine, *shapes, damping - modal_damping]), values, codes)
+    gains = [
+        (each, motor * step.b2 @ motor, motor * step.b2 @ table, table * step.b2 @ table)
+        for each, step in zip(steps, (coarse, fine), strict=True)
+    ]
+    return _PackedModes(
+        rows=np.vstack([*coarse, *fine, *shapes, damping - modal_damping]),
+        # s^T C s: resists the two sides of the transmission moving apart as two bodies. Play removes it; for a lead
+        # error the table's place with the error counts. The rest of the damping drives no mode.
+        damper=-shapes.damper @ shapes.table_side,
+        springs=int(np.count_nonzero(shapes.spring[1:])),
+        coarse=gains[0],
+        fine=gains[1],
+    )
 
 
 def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) -> Shapes:
-    """Shares of the modes; `own`: the chain without the coordinates that mechanisms add after its own."""
+    """Shares of the modes."""
     n = len(own.names)
     table_side = chain.inertia_kg_m2 @ chain.side(chain.table) @ modes.shape
     table, motor = (chain.inertia_kg_m2[:n, :n] @ own.side(place) @ modes.shape[:n] for place in (own.table, own.motor))

@@ -8,7 +8,8 @@ A linear axis is the same chain with r = 1: its angles are metres and its torque
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
 from math import pi
 
 import numpy as np
@@ -21,9 +22,9 @@ LINEAR_LEAD_M = 2.0 * pi
 """Lead of an axis without a screw: r = 1, so that motor and table share metres and newtons."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chain:
-    """Chain of n lumped inertias, free to move as a rigid body.
+    """Chain of n lumped inertias, free to move as a rigid body. A value: chains of equal content are equal.
 
     `damping_ratio` holds one modal damping ratio per mode, in ascending frequency, 0 for the rigid
     body. `transmission @ q` is the deflection of the transmission spring, motor side minus table
@@ -44,6 +45,17 @@ class Chain:
     screw: FloatArray
     screw_stiffness_n_m_rad: float
     damping_n_m_s_rad: FloatArray | None = None
+
+    @cached_property
+    def _content(self) -> tuple[object, ...]:
+        values = (getattr(self, one.name) for one in fields(self))
+        return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Chain) and self._content == other._content
+
+    def __hash__(self) -> int:
+        return hash(self._content)
 
     def side(self, place: int) -> FloatArray:
         """1 for each coordinate on the same side of the transmission as `place`, else 0; shape (n,)."""
@@ -84,6 +96,22 @@ def serial_chain(
     number for all n - 1 elastic modes or one for each. `transmission` is the index of the spring that
     is the nut (default: the last). Raises ValueError where the lengths do not fit.
     """
+    ratios = damping_ratio if isinstance(damping_ratio, float | int) else tuple(damping_ratio)
+    return _serial_chain(
+        tuple(inertias_kg_m2), tuple(stiffnesses_n_m_rad), ratios, lead_m, names=tuple(names), transmission=transmission
+    )
+
+
+@lru_cache(maxsize=256)
+def _serial_chain(
+    inertias_kg_m2: tuple[float, ...],
+    stiffnesses_n_m_rad: tuple[float, ...],
+    damping_ratio: float | tuple[float, ...],
+    lead_m: float,
+    *,
+    names: tuple[str, ...],
+    transmission: int,
+) -> Chain:
     n = len(inertias_kg_m2)
     if n < 1 or len(stiffnesses_n_m_rad) != n - 1:
         raise ValueError(
@@ -99,7 +127,7 @@ def serial_chain(
         stiffness_n_m_rad=spring.T @ (stiffness[:, None] * spring),
         lead_m=lead_m,
         damping_ratio=_elastic_damping(damping_ratio, n),
-        names=tuple(names) or tuple(f"inertia {i + 1}" for i in range(n)),
+        names=names or tuple(f"inertia {i + 1}" for i in range(n)),
         motor=0,
         table=n - 1,
         transmission=nut[0],

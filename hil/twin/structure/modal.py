@@ -8,6 +8,7 @@ the damping on the position; it acts on the velocity.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ class Discrete(NamedTuple):
     b2: FloatArray
 
 
+@lru_cache(maxsize=256)  # a fit changes the chain in few of its parameters
 def modal(chain: Chain) -> Modal:
     """Compute the modes of a chain by the symmetric eigenproblem L^-1 K L^-T with J = L L^T.
 
@@ -82,6 +84,11 @@ def truncate(modal: Modal, modes: int) -> Modal:
         transmission=modal.transmission[:modes],
         screw=modal.screw[:modes],
     )
+
+
+def lowest_modes(chain: Chain, number: int | None) -> Modal:
+    """The lowest modes of a chain; None: all. Raises ValueError where there are not as many."""
+    return modal(chain) if number is None else truncate(modal(chain), number)
 
 
 def discretise(modal: Modal, period_s: float) -> Discrete:

@@ -12,7 +12,7 @@ many degrees of freedom as independent rows. Thousands of rows together tell wha
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.noise_apart import smoothed_runs
+from hil.identification.parallel import in_parallel
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
 from hil.identification.torque_left import fit_plain, measured_motion
@@ -237,9 +238,12 @@ def _spread(values: FloatArray, at: NDArray[np.bool_]) -> FloatArray:
 
 def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Candidates whose shape, at the values where their search begins, is in what a base leaves, the clearest first."""
-    found = []
-    for one in candidates:
+
+    def chance(one: Candidate) -> float:
         begun = (base.estimator.evaluate(base.hypothesis.with_term(term)) for term in (one.term, *one.others))
-        found.append((min(chance_of_shape(start, base, fitted=False) for start in begun), one))
-    level = [(chance, one) for chance, one in found if chance < CRITERIA.significance]
+        return min(chance_of_shape(start, base, fitted=False) for start in begun)
+
+    _asked(base)  # once, before the jobs ask for it
+    found = zip(in_parallel([partial(chance, one) for one in candidates]), candidates, strict=True)
+    level = [(least, one) for least, one in found if least < CRITERIA.significance]
     return [one for _, one in sorted(level, key=lambda pair: pair[0])]

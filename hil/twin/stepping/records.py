@@ -168,9 +168,7 @@ class _PackedModes(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def _pack_modes(
-    own: Chain, chain: Chain, number: int | None, period_s: float, steps: tuple[int, int]
-) -> _PackedModes:
+def _pack_modes(own: Chain, chain: Chain, number: int | None, period_s: float, steps: tuple[int, int]) -> _PackedModes:
     """Pack the modes of a chain; `own`: the chain without the coordinates that mechanisms add after its own."""
     modes = lowest_modes(chain, number)
     coarse, fine = (discretise(modes, period_s / each) for each in steps)
@@ -180,14 +178,14 @@ def _pack_modes(
     shapes = _pack_shapes(own, chain, modes, damping)
     motor, table = shapes.motor, shapes.table
     gains = [
-        (each, motor * step.b2 @ motor, motor * step.b2 @ table, table * step.b2 @ table)
+        (float(each), float(motor * step.b2 @ motor), float(motor * step.b2 @ table), float(table * step.b2 @ table))
         for each, step in zip(steps, (coarse, fine), strict=True)
     ]
     return _PackedModes(
         rows=np.vstack([*coarse, *fine, *shapes, damping - modal_damping]),
         # s^T C s: resists the two sides of the transmission moving apart as two bodies. Play removes it; for a lead
         # error the table's place with the error counts. The rest of the damping drives no mode.
-        damper=-shapes.damper @ shapes.table_side,
+        damper=float(-shapes.damper @ shapes.table_side),
         springs=int(np.count_nonzero(shapes.spring[1:])),
         coarse=gains[0],
         fine=gains[1],

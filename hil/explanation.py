@@ -34,6 +34,7 @@ from hil.recording.recording import Recording, read_recording
 from hil.report.diagnosis_report import write_diagnosis
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
+_DRAFTED_WITH = "# Drafted with: "  # options, at the end of a map
 OUTDATED = (
     "THE MAP OR THE DATA CHANGED since it was drafted. It was edited, so it is kept, with values of the former map; "
     "remove it to have it drafted anew"
@@ -116,7 +117,7 @@ def explain(
     for source in paths:
         progress(f"reading {source.name}")
         try:
-            recording, notes = _recording(source, folder, rate_hz, axis)
+            recording, notes = _recording(source, _map_path(source, paths, folder), rate_hz, axis)
         except PartOfAxis as error:
             if len(paths) == 1:
                 raise
@@ -141,28 +142,44 @@ def explain(
     return Explanation(basis, diagnosis, folder)
 
 
-def _recording(source: Path, folder: Path, rate_hz: float | None, axis: str | None) -> tuple[Recording, list[str]]:
-    """A recording of this project as it is, any other file by its map; and what was assumed."""
-    path = folder / f"{source.stem}-map.yaml"
+def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:
+    """The file of a source's map; sources of one name have their folder in it. Raises InputError for one given twice."""
+    alike = [one for one in sources if one.stem == source.stem]
+    name = source.stem if len(alike) == 1 else f"{source.resolve().parent.name}-{source.name}"
+    if len({(one.resolve().parent.name, one.name) for one in alike}) < len(alike):
+        raise InputError(f"{source}: given twice, or beside a file of the same name and folder name; give each once")
+    return folder / f"{name}-map.yaml"
+
+
+def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None) -> tuple[Recording, list[str]]:
+    """A recording of this project as it is, any other file by its map at `path`; and what was assumed."""
     if not is_file(path):
         if (exported := read_exported(source)) is not None:
             return exported, []
         with suppress(InputError):  # a foreign file
             return read_recording(source), []
+    options = [*(["--rate", f"{rate_hz:g}"] if rate_hz else []), *(["--axis", axis] if axis else [])]
+    mark = f"{_DRAFTED_WITH}{shlex.join(options)}\n"
+    command = shlex.join(["hil", "explain", str(source), "--out", str(path.parent), *options])
     notes = [f"{path}: used as it is"]
     if not is_file(path):
         try:
             draft = draft_map(source, rate_hz, axis)
         except RateNeeded as error:
-            raise RateNeeded(error.problem, shlex.join(["hil", "explain", str(source)])) from None
+            raise RateNeeded(error.problem, command) from None
         take_own_units(draft)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(path, map_text(draft))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, map_text(draft) + (mark if options else ""))
         notes = [f"{path}: which column is what, units and signs; drafted from the file"]
         notes += [f"{path}: {note}" for note in draft.unsure]
         notes += [f"{path}: column {name!r} is not used: {why}" for name, why in draft.left_out.items()]
-    if asked := asked_lines(path.read_text(encoding="utf-8")):
-        command = shlex.join(["hil", "explain", str(source), "--out", str(folder)])
+    text = path.read_text(encoding="utf-8")
+    if options and mark not in text:
+        raise InputError(
+            f"{path}: it is there already and was not drafted with {shlex.join(options)}; edit it and leave the option "
+            "out, remove it to have it drafted anew, or give another --out"
+        )
+    if asked := asked_lines(text):
         told = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
         raise InputError("\n".join([told, *(f"{path}:{line}: {question}" for line, question in asked)]))
     return import_recording(source, path), notes

@@ -67,14 +67,18 @@ def rewritten_folder(folder: Path, mark: str) -> Iterator[Path]:
     """
     if folder.is_dir() and not (folder / mark).is_file():
         refuse_used(folder)
-    part = folder.with_name(f".{folder.name}.{os.getpid()}.new")
+    part, old = (folder.with_name(f".{folder.name}.{os.getpid()}.{end}") for end in ("new", "old"))
     try:
         with new_folder(part) as filled:
             yield filled
-        shutil.rmtree(folder, ignore_errors=True)
+        if folder.is_dir():
+            folder.rename(old)
         part.rename(folder)
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        if old.is_dir() and not folder.is_dir():  # interrupted between both
+            old.rename(folder)
+        for rest in (part, old):
+            shutil.rmtree(rest, ignore_errors=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -80,6 +80,25 @@ def test_a_corrected_bench_is_taken_up_again(explained: tuple[Path, str, str]) -
         bench.write_text(before)
 
 
+def test_an_option_of_another_draft_is_refused_where_a_map_is(explained: tuple[Path, str, str]) -> None:
+    folder, _, _ = explained
+    ran = hil(folder, "explain", "axis.csv", "--rate", "500")
+    assert ran.returncode == 2
+    assert "axis-map.yaml: it is there already and was not drafted with --rate 500" in ran.stderr.replace("\n", " ")
+
+
+def test_files_of_one_name_have_a_map_each(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name)
+    ran = hil(tmp_path, "explain", "first/axis.csv", "second/axis.csv", "--out", "both", "--budget", "5")
+    assert ran.returncode == 0, ran.stderr
+    assert {path.name for path in (tmp_path / "both").glob("*-map.yaml")} == {
+        "first-axis.csv-map.yaml",
+        "second-axis.csv-map.yaml",
+    }
+
+
 def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path: Path) -> None:
     """The torque in tenths of something: inertia and friction are ten times the true ones, and it is told."""
     written(tmp_path, "", 10.0)

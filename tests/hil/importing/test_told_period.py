@@ -59,7 +59,7 @@ def test_other_periods_and_rates_are_no_clock(tmp_path: Path, line: str) -> None
 def test_the_message_names_the_command_that_was_called(tmp_path: Path) -> None:
     path = tmp_path / "log.txt"
     path.write_text(csv_text(COLUMNS, "\t"))
-    with pytest.raises(InputError, match=rf"hil explain {path} --rate HZ"):
+    with pytest.raises(InputError, match=rf"hil explain {path} --out \S+ --rate HZ"):
         explain(path, tmp_path / "out")
 
 

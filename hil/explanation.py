@@ -143,7 +143,7 @@ def explain(
 
 
 def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:
-    """The file of a source's map; sources of one name have their folder in it. Raises InputError for one given twice."""
+    """The map of a source; those of one name have their folder in it. Raises InputError for one given twice."""
     alike = [one for one in sources if one.stem == source.stem]
     name = source.stem if len(alike) == 1 else f"{source.resolve().parent.name}-{source.name}"
     if len({(one.resolve().parent.name, one.name) for one in alike}) < len(alike):

@@ -33,7 +33,7 @@ def compensate(
 
     from hil.bench.bench_file import Bench, load_bench
     from hil.commands.warm_up import compile_kernels
-    from hil.compensating.compensate import plan_compensation, section_of
+    from hil.compensating.compensate import plan_compensation, section_of, taken_by_drive
     from hil.compensating.controllers.write_controllers import controller_files, write_files
     from hil.compensating.derive import size
     from hil.control.compensation_tables import Adds
@@ -55,7 +55,10 @@ def compensate(
     motion = plan(load_profile(profile), diagnosed.period_s)
     compile_kernels()
     made = plan_compensation(diagnosed, motion, result, fade_in_s)
-    section = section_of(made, path, date.today().isoformat())
+    taken, not_taken = taken_by_drive(diagnosed, made)
+    if not taken.compensation.tables and not controllers:
+        raise HilError(f"nothing written: {'; '.join(f'{name}: {why}' for name, why in not_taken)}; see --for")
+    section = section_of(taken, path, date.today().isoformat())
     compensated = Bench.model_validate(diagnosed.model_dump(mode="json") | {"compensation": section})
     units = {Adds.TORQUE: diagnosed.axis.drive_unit, Adds.POSITION: "rad" if diagnosed.axis.turns else "m"}
     rows = []
@@ -85,6 +88,8 @@ def compensate(
     for controller, made_for in files.items():
         for name, reason in made_for.not_taken:
             out.print(f"Not for {controller}: {name}: {reason}.")
+    for name, reason in not_taken:
+        out.print(f"Not in the bench file: {name}: {reason}.")
     for path in written:
         out.print(f"Table: {path}")
     out.print(f"Bench: {target}; off by `compensation: enabled: false`")

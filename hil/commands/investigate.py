@@ -83,10 +83,16 @@ def investigate(
     folder = folder or default_folder(f"investigate-{loaded.name}")
     refuse_used(folder)
     simulation = loaded.simulation
+
+    def file_of(name: str, place: Path) -> Path:
+        """The profile file of a recording NAME or NAME_label; that of a motion of this investigation is beside it."""
+        stems = [stem for stem in files if name == stem or name.startswith(f"{stem}_")]
+        return files[max(stems, key=len)] if stems else place / f"{name}.yaml"
+
     seeds = itertools.count(seed if seed is not None else simulation.seed if simulation else 0)
 
     def run(profile: Profile, place: Path, name: str, on: Bench = loaded) -> RunResult:
-        with named(bench, files.get(name, place / f"{name}.yaml")):
+        with named(bench, file_of(name, place)):
             ran = run_profile(
                 on,
                 profile,
@@ -101,6 +107,9 @@ def investigate(
             )
         if on is loaded:
             say(ran, virtual)
+        else:
+            for note in (*ran.notes, *ran.doubts):
+                err.print(f"note: {name}: {note}")
         if ran.outcome.ending is Ending.INTERRUPTED:
             raise typer.Exit(130)
         return ran

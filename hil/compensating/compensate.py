@@ -1,5 +1,6 @@
 """A compensation of a diagnosed bench: its tables, the gain that each promises, and the section of the bench file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hil.bench.bench_file import Bench
+from hil.bench.hardware import DriveMode
 from hil.compensating.derive import Derived, derive, reach_of
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of, predict
 from hil.compensating.shapes import shapes
@@ -67,6 +69,20 @@ def plan_compensation(bench: Bench, motion: Trajectory, result: Result | None, f
         for table in compensation.tables
     }
     return Plan(derived, gain, alone, _errors(bench, drawn, derived, motion))
+
+
+def with_tables(plan: Plan, tables: Sequence[CompensationTable]) -> Plan:
+    """The plan with some of its tables; the gain stays that of all."""
+    derived = plan.derived
+    return replace(plan, derived=replace(derived, compensation=replace(derived.compensation, tables=tuple(tables))))
+
+
+def taken_by_drive(bench: Bench, plan: Plan) -> tuple[Plan, list[tuple[str, str]]]:
+    """The plan with the tables that the drive of a bench takes from its bench file, and why not the others."""
+    in_drive = bench.drive is not None and bench.drive.mode is not DriveMode.CST
+    left = [table.name for table in plan.compensation.tables if in_drive and table.adds is Adds.TORQUE]
+    rest = [table for table in plan.compensation.tables if table.name not in left]
+    return with_tables(plan, rest), [(name, "a torque is added to the command of a drive in cst only") for name in left]
 
 
 def _errors(bench: Bench, drawn: tuple[Bench, ...], derived: Derived, motion: Trajectory) -> dict[str, float]:

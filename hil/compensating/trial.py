@@ -6,7 +6,7 @@ accuracy.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +15,14 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.bench.hardware import DriveMode
-from hil.compensating.compensate import DRAWS, Plan, plan_compensation, section_of
-from hil.compensating.derive import Derived
+from hil.compensating.compensate import (
+    DRAWS,
+    Plan,
+    plan_compensation,
+    section_of,
+    taken_by_drive,
+    with_tables,
+)
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of
 from hil.control.compensation_tables import Adds, CompensationTable
 from hil.diagnosis.result import Result
@@ -100,11 +105,12 @@ def rms(values: Sequence[float]) -> float:
 
 
 def error_series(recording: Recording, bench: Bench, fade_in_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time [s], following error and positioning error without its mean [m], (n,) each, after the fade-in.
+    """Time [s], following error and positioning error without its mean [m], (n,) each, after approach and fade-in.
 
     As `prediction.errors_of` has those of the twin; without a linear encoder the table is where the motor is.
     """
-    ratio, first = bench.axis.ratio_m_rad, round(fade_in_s / bench.period_s)
+    approached_s = [one["end_s"] for one in recording.metadata.get("segments", ()) if one["kind"] == "approach"]
+    ratio, first = bench.axis.ratio_m_rad, round((sum(approached_s) + fade_in_s) / bench.period_s)
     command, motor = recording["position_command_m"], ratio * recording[recording.axis.motor_position]
     table = recording.columns.get("table_position_m", motor)
     added = recording.columns.get("compensation_position_m", np.zeros(len(recording)))
@@ -143,7 +149,7 @@ def try_compensation(
     widest = max(motions.values(), key=lambda one: float(np.abs(one.velocity_m_s).max()))
     made = plan_compensation(bench, widest, result, fade_in_s)
     unit = "rad" if bench.axis.turns else "m"
-    made, untried = _that_can_be_tried(given, made)
+    made, untried = _that_can_be_judged(given, made)
     if made.harms or not made.compensation.tables:
         return Trial(None, made, (), (*made.derived.left_out, *untried), fade_in_s, unit)
 
@@ -171,7 +177,7 @@ def try_compensation(
             tables, after = rest, without
             kind = _KINDS[table.adds]
             dropped.append((table.name, f"{kind} error {quantity(own, unit)} with it, {quantity(worse, unit)} without"))
-    kept = replace(made, derived=_only(made.derived, tables))
+    kept = with_tables(made, tables)
     drawn = tuple(drawn_benches(bench, result, DRAWS))
     tried = [
         TriedMotion(
@@ -187,29 +193,22 @@ def try_compensation(
     return Trial(section, kept, tuple(tried), (*made.derived.left_out, *dropped), fade_in_s, unit)
 
 
-def _that_can_be_tried(given: Bench, made: Plan) -> tuple[Plan, list[tuple[str, str]]]:
+def _that_can_be_judged(given: Bench, made: Plan) -> tuple[Plan, list[tuple[str, str]]]:
     """The plan with the tables that the drive takes and a run can judge, and why not the others."""
-    in_drive = given.drive is not None and given.drive.mode is not DriveMode.CST
-    tables, untried = list[CompensationTable](), list[tuple[str, str]]()
-    for table in made.compensation.tables:
-        if table.adds is Adds.TORQUE and in_drive:
-            untried.append((table.name, "a torque is added to the command of a drive in cst only"))
-        elif table.adds is Adds.POSITION and given.encoders.table is None:
-            untried.append((table.name, "without a linear encoder no run tells where the table is"))
-        else:
-            tables.append(table)
-    return replace(made, derived=_only(made.derived, tables)), untried
-
-
-def _only(derived: Derived, tables: Sequence[CompensationTable]) -> Derived:
-    return replace(derived, compensation=replace(derived.compensation, tables=tuple(tables)))
+    taken, untried = taken_by_drive(given, made)
+    if given.encoders.table is None:
+        reason = "without a linear encoder no run tells where the table is"
+        tables = taken.compensation.tables
+        untried += [(table.name, reason) for table in tables if table.adds is Adds.POSITION]
+        taken = with_tables(taken, [table for table in tables if table.adds is not Adds.POSITION])
+    return taken, untried
 
 
 def _with(bench: Bench, made: Plan, tables: Sequence[CompensationTable]) -> Bench:
     """The bench with some of the tables of a plan."""
     if not tables:
         return bench
-    section = _section(bench, replace(made, derived=_only(made.derived, tables)))
+    section = _section(bench, with_tables(made, tables))
     return Bench.model_validate(bench.model_dump(mode="json") | {"compensation": section})
 
 

@@ -25,7 +25,8 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int) -> ListedName
     """
     words = "|".join(lexicon().enumerated)
     place = re.compile(
-        rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)](?!\d)", re.IGNORECASE
+        rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)](?!\d)",
+        re.IGNORECASE,
     )
     given: list[tuple[int, int, str]] = []
     for index, line in enumerate(lines):

@@ -75,19 +75,36 @@ def test_a_position_loop_on_the_table_needs_no_position_table() -> None:
     assert ("periodic_lead_error", "the position loop sees the table and corrects it") in found.left_out
 
 
-def test_the_command_writes_a_bench_and_refuses_to_overwrite_it(tmp_path: Path) -> None:
-    bench = diagnosed()
-    late = {"effect": "transport_delay", "parameters": {"delay_s": 0.0005}}
-    write_bench(
-        Bench.model_validate(bench.model_dump(mode="json") | {"mechanisms": [late]}), tmp_path / "bench.diagnosed.yaml"
-    )
+def _write_motion(folder: Path) -> None:
     profile = {"schema_version": 1, "limits": {"velocity_m_s": 0.6, "acceleration_m_s2": 2.5, "jerk_m_s3": 120}}
     profile["segments"] = [  # type: ignore[assignment]
         {"kind": "dwell", "duration_s": 0.5},
         {"kind": "sine_squared", "to_m": 0.05, "feed_m_s": 0.1},
         {"kind": "sine_squared", "to_m": 0.0, "feed_m_s": 0.1},
     ]
-    (tmp_path / "move.yaml").write_text(yaml.safe_dump(profile), encoding="utf-8")
+    (folder / "move.yaml").write_text(yaml.safe_dump(profile), encoding="utf-8")
+
+
+def test_a_drive_in_csp_gets_the_tables_of_the_position_only(tmp_path: Path) -> None:
+    drive = diagnosed().model_dump(mode="json")["drive"] | {"mode": "csp", "rated_torque_n_m": 5.0}
+    write_bench(
+        Bench.model_validate(diagnosed().model_dump(mode="json") | {"drive": drive}), tmp_path / "bench.diagnosed.yaml"
+    )
+    _write_motion(tmp_path)
+    ran = command(tmp_path, "compensate", ".", "--profile", "move.yaml", "--fade-in", "0.3", "--for", "cia402")
+    assert ran.returncode == 0, ran.stderr
+    assert "Not in the bench file: inertia: a torque is added to the command of a drive in cst only" in ran.stdout
+    written = load_bench(tmp_path / "bench.compensated.yaml")
+    assert {entry.adds for entry in written.compensation.entries} == {Adds.POSITION}  # type: ignore[union-attr]
+
+
+def test_the_command_writes_a_bench_and_refuses_to_overwrite_it(tmp_path: Path) -> None:
+    bench = diagnosed()
+    late = {"effect": "transport_delay", "parameters": {"delay_s": 0.0005}}
+    write_bench(
+        Bench.model_validate(bench.model_dump(mode="json") | {"mechanisms": [late]}), tmp_path / "bench.diagnosed.yaml"
+    )
+    _write_motion(tmp_path)
     arguments = ("compensate", ".", "--profile", "move.yaml", "--fade-in", "0.3")
     ran = command(tmp_path, *arguments)
     assert ran.returncode == 0, ran.stderr

@@ -23,9 +23,12 @@ def compile_kernels() -> None:
         task = "compiling kernels, once after the installation: about a minute"
         tell(task, 0.0)
         # imported late: the kernels are built by the first imports
+        import numpy as np
+
         from hil.api import simulate
         from hil.bench.bench_file import load_bench
         from hil.control import cascade
+        from hil.diagnosis.search.change_points import segments
         from hil.motion.trajectory import plan
         from hil.validation.proof.draw.demo import from_rest, there_and_back
 
@@ -43,6 +46,7 @@ def compile_kernels() -> None:
         tell(task, 0.9)
         cascade.replay(bench.gains, cascade.init(0.0), *setpoints, measured.motor_position, measured.table_position_m)
         bench.twin().drive(measured.torque_command)
+        segments(measured.torque, np.ones(measured.torque.size), 1.0, 1.0)
         tell(task, 1.0)
     mark.write_text(versions, encoding="utf-8")
 

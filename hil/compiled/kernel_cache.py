@@ -20,7 +20,8 @@ PACKAGE = Path(__file__).parents[1]
 # All that is compiled or gives a kernel its types and constants; a test compares it with the imports of numba.
 _MODULES = ("checks", "columns", "cycle", "limits", "sign_check", "virtual")
 _OF_THE_LOOP = tuple(f"hil/loop/{name}.py" for name in _MODULES)
-SOURCES = ("hil/compiled", "hil/control", "hil/twin", *_OF_THE_LOOP, "drivers/sim")
+_OF_THE_SEARCH = "hil/diagnosis/search/change_points.py"
+SOURCES = ("hil/compiled", "hil/control", "hil/twin", *_OF_THE_LOOP, _OF_THE_SEARCH, "drivers/sim")
 # Versions and worktrees that share NUMBA_CACHE_DIR or the user's cache; a folder takes some 10 MB.
 KEPT = 8
 _KEYED = re.compile(r"hil-kernels-[0-9a-f]{16}")

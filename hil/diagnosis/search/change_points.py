@@ -8,6 +8,7 @@ over the blocks of each window: the energy that a constant level removes there, 
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from hil.arrays import FloatArray
 
@@ -27,15 +28,8 @@ def segments(values: FloatArray, weights: FloatArray, variance: float, penalty: 
     """
     count = np.concatenate([[0.0], np.cumsum(weights)])
     total = np.concatenate([[0.0], np.cumsum(weights * values)])
-    best, begins = np.zeros(count.size), np.full(count.size, -1)
-    for end in range(1, count.size):
-        level_sum, rows = total[end] - total[:end], count[end] - count[:end]
-        gains = best[:end] + level_sum**2 / (np.maximum(rows, 1.0) * variance) - penalty
-        begin = int(np.argmax(gains))
-        best[end] = max(gains[begin], best[end - 1])
-        if gains[begin] > best[end - 1]:
-            begins[end] = begin
-    windows, end = list[Segment](), count.size - 1
+    begins = _partition(count, total, variance, penalty)
+    windows, end = list[Segment](), values.size
     while end > 0:
         begin = int(begins[end])
         if begin >= 0:
@@ -43,6 +37,19 @@ def segments(values: FloatArray, weights: FloatArray, variance: float, penalty: 
             windows.append(Segment(begin, end, float(level)))
         end = begin if begin >= 0 else end - 1
     return windows[::-1]
+
+
+@njit(cache=True, nogil=True)
+def _partition(count, total, variance, penalty):  # type: ignore[no-untyped-def]
+    """Begin (n + 1,) of the window that ends at each block in the best partition up to it; -1: no window ends there."""
+    best, begins = np.zeros(count.size), np.full(count.size, -1)
+    for end in range(1, count.size):
+        best[end] = best[end - 1]
+        for begin in range(end):
+            removed = (total[end] - total[begin]) ** 2 / (max(count[end] - count[begin], 1.0) * variance)
+            if best[begin] + removed - penalty > best[end]:
+                best[end], begins[end] = best[begin] + removed - penalty, begin
+    return begins
 
 
 def joined(windows: list[Segment], weights: FloatArray, short: int, alike: float) -> list[Segment]:

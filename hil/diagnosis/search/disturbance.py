@@ -19,6 +19,7 @@ from hil.identification.measured import Measured
 from hil.identification.periods import harmonic_share, strongest_periods
 
 _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
+_FINE_M, _COARSEST_M = 1e-3, 1e-2  # signal periods of scales: optical and magnetic ones below, inductive ones above
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
 _BINS = 400  # of the travel, for zones of friction
 _ORDERS = np.arange(1, 161)  # of the motor angle: slots, pole passings, and their common multiples
@@ -136,9 +137,10 @@ def rest_position(runs: Sequence[Measured], disturbances: Sequence[Disturbance],
 
 
 def scale_periods(runs: Sequence[Measured], errors: Sequence[FloatArray], most: int = 2) -> list[float]:
-    """Periods [m] below 1 mm in which an error (n,) of the linear encoder repeats, best first."""
-    x = np.concatenate([run.table_m for run in runs])
-    return strongest_periods(x, np.concatenate(list(errors)), 0.5e-6, 2e-6, most, longest=1e-3)
+    """Periods [m] in which an error (n,) of the linear encoder repeats, best first: fine ones, then coarse ones."""
+    x, error = np.concatenate([run.table_m for run in runs]), np.concatenate(list(errors))
+    fine = strongest_periods(x, error, 0.5e-6, 2e-6, most, longest=_FINE_M)
+    return [*fine, *strongest_periods(x, error, _FINE_M / 4.0, _FINE_M, most, longest=_COARSEST_M)]
 
 
 def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:

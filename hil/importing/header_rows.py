@@ -74,6 +74,7 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
     rows = [row for row in read if row is not None]
     # a row that is one field short counts where no other one tells what the columns are
     rows = [row for row in rows if row.whole] if any(row.whole and row.sure for row in rows) else rows
+    rows = _below_padded(rows)
     texts = [row for row in rows if row.kind in (RowKind.NAMES, RowKind.TEXT)]
     named = _names(texts)
     if named is None:
@@ -107,6 +108,9 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
             case _ if row is not named:
                 header.unused[row.line] = row.text
         used.add(row.line)
+    header.units |= {
+        name: text for name, text in header.words.items() if name not in header.units and unit_of_text(text) is not None
+    }
     if named is None and listed is None:
         near = [index for index in range(len(lines)) if lines[index].strip() and index not in used][-_NEAR:]
         if near and len(split_line(COMMENT.sub("", lines[near[-1]]), delimiter)) > 1:
@@ -115,6 +119,13 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
                 f"{shown(lines[near[-1]])!r}"
             )
     return header
+
+
+def _below_padded(rows: list[HeaderRow]) -> list[HeaderRow]:
+    """Rows without those at the top that a spreadsheet filled up to the width: facts of the file, over no column."""
+    padded = [not any(row.fields[-2:]) for row in rows]
+    first = padded.index(False) if False in padded else 0
+    return rows[first:]
 
 
 def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, counted: bool) -> HeaderRow | None:

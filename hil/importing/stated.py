@@ -5,6 +5,7 @@ torque_constant = "0.83 Nm/A"      a column kt [Nm/A] with 0.83 in every row
 """
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -67,9 +68,18 @@ class Stated:
         return header_values([*lines, *texts], sized)
 
     def units_of(self, columns: Collection[str]) -> dict[str, str]:
-        """Units of columns by texts with their name: torque_unit = "Nm"."""
+        """Units of columns by texts with their name, or beside the only column of a structure.
+
+        torque_unit = "Nm"; torque.data and torque.unit = "Nm"
+        """
         own = self.units(columns)
-        return {name: own[_plain(name)] for name in columns if _plain(name) in own}
+        parents = Counter(name.rpartition(".")[0] for name in columns)
+        beside = {
+            name: own[_plain(parent)]
+            for name in columns
+            if parents[parent := name.rpartition(".")[0]] == 1 and _plain(parent) in own
+        }
+        return beside | {name: own[_plain(name)] for name in columns if _plain(name) in own}
 
 
 def _goes_with(name: str, unit: str) -> bool:

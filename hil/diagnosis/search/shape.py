@@ -43,6 +43,7 @@ _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
 _ORDER = 24  # of the autoregressive model: as that of `hil.identification.inference`
 _RIDGE = 1e-4  # of white noise in the autocovariance: a filter that takes off a hundredth of the rms is far enough
+_ALIKE = 0.9  # of the energy of a shape: it is an offset; friction over time or place leaves more than a third
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
@@ -67,7 +68,8 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
         shape = own.quiet - after
         if not np.isfinite(shape).all():
             continue
-        size, ratio, free = _first_coefficient(np.column_stack([shape, own.beside]), own.measured, own.rows)
+        columns = np.column_stack([shape, own.beside_shape(shape)])
+        size, ratio, free = _first_coefficient(columns, own.measured, own.rows)
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             if fitted:
                 removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
@@ -99,14 +101,25 @@ def _faint(fit: Fit, without: Fit) -> tuple[Hypothesis, float]:
 class _Seen(NamedTuple):
     """Residuals (m,) of a channel on the rows that slide: of the recordings, and of their smoothed motion (`quiet`).
 
-    `beside` (m, q) has the columns of least squares beside a shape; a shape of less energy than `least` does not count.
+    `beside` (m, q) has the columns of least squares beside a shape, `constant` (q,) marks the offsets among them. A
+    shape of less energy than `least` does not count.
     """
 
     rows: list[NDArray[np.bool_]]
     measured: FloatArray
     quiet: FloatArray
     beside: FloatArray
+    constant: NDArray[np.bool_]
     least: float
+
+    def beside_shape(self, shape: FloatArray) -> FloatArray:
+        """The columns beside a shape (m,), without an offset where the shape is one itself."""
+        others = self.beside[:, ~self.constant]
+        pair = np.column_stack([shape, np.ones_like(shape)])
+        left = pair - others @ np.linalg.lstsq(others, pair, rcond=_RANK)[0] if others.size else pair
+        energies = np.einsum("ij,ij->j", left, left)
+        alike = float(left[:, 0] @ left[:, 1]) ** 2 > _ALIKE * float(energies[0] * energies[1])
+        return others if alike else self.beside
 
 
 class _Asked(NamedTuple):
@@ -134,14 +147,13 @@ def _asked(without: Fit) -> _Asked | None:
             continue
         beside = [np.ones_like(measured)]
         if channel == TORQUE:
-            columns = [plain_columns(measured_motion(run).moved) for run in data.runs]
-            beside += [
-                np.concatenate([one[name][at] for one, at in zip(columns, rows, strict=True)]) for name in MOTION
-            ]
+            moved = [plain_columns(measured_motion(run).moved) for run in data.runs]
+            beside += [np.concatenate([one[name][at] for one, at in zip(moved, rows, strict=True)]) for name in MOTION]
         changed = (_joined(left_in_channel(one, quiet, channel, plain), rows) - own for one in _other_values(without))
         beside += [change for change in changed if np.isfinite(change).all()]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
-        found[channel] = _Seen(rows, measured, own, np.column_stack(beside), least)
+        columns = np.column_stack(beside)
+        found[channel] = _Seen(rows, measured, own, columns, np.ptp(columns, axis=0) == 0.0, least)
     return _Asked(found, plain, quiet)
 
 

@@ -28,9 +28,14 @@ def test_it_takes_the_place_of_the_former_one(tmp_path: Path) -> None:
 def test_an_interrupt_while_it_is_filled_leaves_the_former_one(tmp_path: Path) -> None:
     folder = tmp_path / "report"
     report(folder, "first")
-    with pytest.raises(KeyboardInterrupt), rewritten_folder(folder, MARK) as part:
-        (part / MARK).write_text("second")
-        raise KeyboardInterrupt
+
+    def interrupted() -> None:
+        with rewritten_folder(folder, MARK) as part:
+            (part / MARK).write_text("second")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert [path.name for path in tmp_path.iterdir()] == ["report"]
     assert (folder / MARK).read_text() == "first"
 

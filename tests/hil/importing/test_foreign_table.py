@@ -57,12 +57,31 @@ def simulink(path: Path) -> None:
     savemat(path, {"logsout": {"time": AXIS["t"], "signals": signals}})
 
 
+def measured_structure(path: Path) -> None:
+    from scipy.io import savemat
+
+    told = {"t": ("time", "s"), "x_set": ("pos_cmd", "mm"), "angle": ("angle_act", "rad"), "torque": ("trq_act", "Nm")}
+    signals = {name: {"data": AXIS[key], "unit": unit} for key, (name, unit) in told.items()}
+    savemat(path, {"rec": {"meta": {"fs": 1000.0}, "signals": signals}})
+
+
 def twincat(path: Path) -> None:
     names = "Name;SetPos [mm];Name;ActAngle [rad];Name;ActTorque [Nm]"
     above = f"Name;Project\nFile;a.svdx\n\n{names}\nSampleTime;1;SampleTime;1;SampleTime;1"
     rows = zip(1e3 * AXIS["t"], AXIS["x_set"], AXIS["angle"], AXIS["torque"], strict=True)
     lines = [f"{t:g};{x:.9g};{t:g};{angle:.9g};{t:g};{torque:.9g}" for t, x, angle, torque in rows]
     path.write_text("\n".join([above, "", *lines]) + "\n")
+
+
+def twincat_filled(path: Path) -> None:
+    """As TwinCAT writes it: facts of the file are filled up to the width of the rows, units stand as comments."""
+    names = "Name\tAxis1.SetPos\tName\tAxis1.ActAngle\tName\tAxis1.ActTorque"
+    comment = "SymbolComment\tmm\tSymbolComment\trad\tSymbolComment\tNm"
+    facts = "Name\tScope Project\t\t\t\t\nFile\ta.svdx\t\t\t\t\nStarttime\t133547712\tTuesday\t14:20:00.000\t\t"
+    times = "SampleTime[ms]\t1\tSampleTime[ms]\t1\tSampleTime[ms]\t1"
+    rows = zip(1e3 * AXIS["t"], AXIS["x_set"], AXIS["angle"], AXIS["torque"], strict=True)
+    lines = [f"{t:g}\t{x:.9g}\t{t:g}\t{angle:.9g}\t{t:g}\t{torque:.9g}" for t, x, angle, torque in rows]
+    path.write_text("\n".join([facts, "\t" * 5, names, comment, times, "\t" * 5, *lines]) + "\n")
 
 
 @pytest.mark.parametrize(
@@ -73,10 +92,22 @@ def twincat(path: Path) -> None:
         ("csv", dated(lambda minute, second: f"12:{minute:02d}:{second:06.3f}")),
         ("csv", dated(lambda minute, second: f"{45352.5 + (60 * minute + second) / 86400:.13f}")),
         ("mat", simulink),
+        ("mat", measured_structure),
         ("csv", twincat),
+        ("csv", twincat_filled),
         ("csv", lambda path: write(path, renamed(AXIS | {"t": 1.7e9 + AXIS["t"]}, **NAMES))),
     ],
-    ids=["date", "German date", "time of day", "day number", "Simulink structure", "TwinCAT Scope", "since 1970"],
+    ids=[
+        "date",
+        "German date",
+        "time of day",
+        "day number",
+        "Simulink structure",
+        "structures with data and unit",
+        "TwinCAT Scope",
+        "TwinCAT Scope, filled",
+        "since 1970",
+    ],
 )
 def test_the_axis_is_imported_from_what_loggers_write(
     tmp_path: Path, ending: str, make: Callable[[Path], None]

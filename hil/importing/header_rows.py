@@ -139,8 +139,8 @@ def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, co
     if times and len({fields[index] for index in times}) == 1 and label(fields[0]).quantity is not Quantity.TIME:
         kind = _kind_of_label(fields[0])  # what the row tells stands over each column of time
         fields = ["" if index in times else value for index, value in enumerate(fields)]
-    elif kind is None and len(fields) in (width, width + 1) and (kind := _kind_of_label(fields[0])):
-        fields = ["", *fields[1:]] if len(fields) == width else fields[1:]
+    elif kind is None and abs(len(fields) - width) <= 1 and (kind := _kind_of_label(fields[0])):
+        fields = fields[1:] if len(fields) > width else ["", *fields[1:], *[""] * (width - len(fields))]
     elif colon and len(fields) == width + 1 and fields[0] == f"{word}:":
         fields = fields[1:]  # a word of any language before the names
     elif len(fields) == width + 1 and _kind(fields[1:], form) is RowKind.UNITS and unit_of_text(fields[0]) is None:

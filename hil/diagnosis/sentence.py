@@ -41,12 +41,13 @@ def sentence(term: Term, bench: Bench, errors: TermErrors | None = None) -> str:
     if given[mechanism.strength] < 0.0 and opposite:
         text, given[mechanism.strength] = opposite, -given[mechanism.strength]
     values = {}
-    least = _LITTLE * max((abs(given[place]) for place in mechanism.indices(Role.STRENGTH)), default=0.0)
+    sizes = [abs(given[place]) for place in mechanism.indices(Role.STRENGTH)]
     for parameter, value, error in zip(mechanism.parameters, given, of_values, strict=True):
-        little = parameter.role is Role.STRENGTH and abs(value) < least
-        values[parameter.name] = (
-            f"less than {value_in_words(least, parameter, bench)}" if little else _told(value, error, parameter, bench)
-        )
+        most = 0.0  # of a harmonic that is little, or within its error
+        if parameter.role is Role.STRENGTH and abs(value) < max(sizes):
+            most = max(_LITTLE * max(sizes), abs(value) + error if abs(value) < error else 0.0)
+        bound = f"less than {value_in_words(most, parameter, bench)}"
+        values[parameter.name] = bound if abs(value) < most else _told(value, error, parameter, bench)
     if errors and told_by.rate and (duration := _open_end(mechanism, given, of_values)):
         text = told_by.rate
         per_minute = _MINUTE_S / duration

@@ -65,3 +65,9 @@ def test_a_strength_within_its_error_has_it_beside_it() -> None:
 
 def test_a_repetition_is_rounded_by_its_error() -> None:
     assert "71.5 times per revolution" in said("cogging_torque", (0.0116, 71.46, 0.0), (1e-4, 0.1, 0.1))
+
+
+def test_a_harmonic_within_its_error_is_told_by_a_bound() -> None:
+    values, errors = (11e-6, 0.3, 124e-6, 0.1, 6.8e-6, 0.2), (12e-6, 1.0, 8e-6, 0.1, 6.9e-6, 1.0)
+    told = said("periodic_lead_error", values, errors)
+    assert "by less than 23.0 µm once, 124 µm twice and less than 13.7 µm three times" in told

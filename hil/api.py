@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.time_left import BUDGET_S
 from hil.errors import FieldError, HilError, InputError
 
 if TYPE_CHECKING:
@@ -157,7 +156,7 @@ def diagnose(
     *,
     held_out: Recording | Sequence[Recording] = (),
     progress: Callable[[str], None] = lambda text: None,
-    budget_s: float = BUDGET_S,
+    budget_s: float | None = None,
 ) -> Diagnosis:
     """Find the physics that the twin of a bench lacks: where it acts, its parameters, and a proof.
 

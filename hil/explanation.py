@@ -18,7 +18,6 @@ from pathlib import Path
 from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.time_left import BUDGET_S
 from hil.drafting.draft_mark import draft_state, marked
 from hil.drafting.drafted_bench import DraftedBench, drafted
 from hil.errors import InputError, PartOfAxis, RateNeeded, listed
@@ -96,7 +95,7 @@ def explain(
     progress: Callable[[str], None] = lambda text: None,
     first: Callable[[Basis], None] = lambda basis: None,
     answer: Callable[[Diagnosis], None] = lambda diagnosis: None,
-    budget_s: float = BUDGET_S,
+    budget_s: float | None = None,
 ) -> Explanation:
     """Read the recordings of one axis, draft what the folder lacks, diagnose, and write the page.
 

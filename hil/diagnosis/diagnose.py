@@ -10,7 +10,7 @@ from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone, 
 from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.stages import Judged, Prepared, Progress
-from hil.diagnosis.time_left import BUDGET_S, with_time_left
+from hil.diagnosis.time_left import usual_budget_s, with_time_left
 from hil.diagnosis.verdict.held_out import test_on_held_out
 from hil.diagnosis.verdict.judge import judge
 from hil.diagnosis.verdict.reproduction import behind_plain, with_less_torque
@@ -27,15 +27,16 @@ def diagnose(
     validate: Sequence[Recording],
     bench: Bench,
     progress: Progress = lambda text: None,
-    budget_s: float = BUDGET_S,
+    budget_s: float | None = None,
 ) -> Diagnosis:
     """Diagnose recordings of one axis against its bench, and validate the result on recordings of another motion.
 
     Without `validate` a third of each recording is held out. `progress` gets the name of each step and the time
-    left. After most of `budget_s` of processor time the search ends with the best explanation so far: the answer does
-    not depend on how busy the machine is, but may on how fast. Raises InputError with all reasons if the recordings
-    cannot be diagnosed.
+    left. After most of `budget_s` of processor time (default: `usual_budget_s`) the search ends with the best
+    explanation so far: the answer does not depend on how busy the machine is, but may on how fast. Raises InputError
+    with all reasons if the recordings cannot be diagnosed.
     """
+    budget_s = usual_budget_s(sum(map(len, train))) if budget_s is None else budget_s
     if not budget_s > 0.0:
         raise InputError(f"budget: given {budget_s:g} s, allowed above 0 s")
     begin_s, end_s = time.monotonic(), time.process_time() + SEARCH_SHARE * budget_s

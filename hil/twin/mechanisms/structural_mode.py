@@ -138,7 +138,7 @@ MECHANISM = Mechanism(
             _with_flexible_load,
             "flexible load",
             text=Text(
-                "The load is flexible: an inertia {mass_ratio} times that of the rest of the axis swings against a "
+                "The load is flexible: an inertia of {mass_ratio} of that of the rest of the axis swings against a "
                 "motor at rest with {frequency_hz} (antiresonance of the motor), damped by {damping_ratio}."
             ),
             element="load on an elastic arm, shaft or belt",

@@ -9,7 +9,8 @@ import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
-from hil.compensating.derive import Derived, derive, reach_of
+from hil.compensating.derive import Derived, derive, limits_of, reach_of
+from hil.compensating.law_lag import with_lag_of_law
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of, predict
 from hil.compensating.shapes import shapes
 from hil.control.compensation_tables import Adds, Compensation, CompensationTable
@@ -59,9 +60,12 @@ def plan_compensation(bench: Bench, motion: Trajectory, result: Result | None, f
     bench = bench.model_copy(update={"compensation": None})
     reach = reach_of(bench, motion)
     derived = derive(bench, reach, fade_in_s)
-    compensation = derived.compensation
-    if not compensation.tables:
+    if not derived.compensation.tables:
         raise HilError("nothing of this bench can be compensated by a table")
+    tables = with_lag_of_law(bench, motion, derived.compensation, fade_in_s)
+    limits = limits_of(tables, reach, bench.gains.torque_limit_n_m, fade_in_s)
+    compensation = replace(derived.compensation, tables=tables, limits=limits)
+    derived = replace(derived, compensation=compensation)
     drawn = tuple(drawn_benches(bench, result, DRAWS)) if result is not None else ()
     gain = gain_of(bench, motion, compensation, drawn, fade_in_s)
     alone = {

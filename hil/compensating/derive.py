@@ -1,6 +1,6 @@
 """Tables of a diagnosed bench: what each comes from, and what no table compensates, with the reason."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,7 +87,7 @@ def derive(bench: Bench, reach: TableReach, fade_in_s: float) -> Derived:
             sources[name].append(active.effect)
         if not set(moved) & set(sources):
             left_out.append((active.effect, TOO_FINE if set(moved) & fine else _reason(active, from_table)))
-    limits = _limits(list(kept.values()), reach, gains.torque_limit_n_m, fade_in_s)
+    limits = limits_of(list(kept.values()), reach, gains.torque_limit_n_m, fade_in_s)
     angle_per_m = twin.physics.angle_per_unit / gains.ratio_m_rad
     return Derived(
         Compensation(tuple(kept.values()), limits, angle_per_m),
@@ -134,8 +134,8 @@ def _reason(active: Active, from_table: bool) -> str:
     return _REASONS.get(stage, NOTHING)
 
 
-def _limits(
-    tables: list[CompensationTable], reach: TableReach, torque_limit: float, fade_in_s: float
+def limits_of(
+    tables: Sequence[CompensationTable], reach: TableReach, torque_limit: float, fade_in_s: float
 ) -> CompensationLimits:
     """Limits with room above the tables, and speeds with which they can be followed over the reach."""
     of_torque, of_position = ([table for table in tables if table.adds is adds] for adds in Adds)

@@ -45,16 +45,21 @@ class Gain(NamedTuple):
         return min(shares), max(shares)
 
 
-def errors_of(
-    position_command_m: FloatArray, added_m: FloatArray, fed_back_m: FloatArray, table_m: FloatArray, first: int
-) -> Errors:
-    """Errors of a motion (n,) from row `first` on; the feedback has to follow the corrected set-points."""
-    following = (position_command_m + added_m - fed_back_m)[first:]
-    return Errors(float(np.sqrt(np.mean(following**2))), float(np.std((table_m - position_command_m)[first:])))
+class Simulated(NamedTuple):
+    """Following error of the motor to the corrected set-points, and place of the table less the set-point [m], (n,)."""
+
+    following_m: FloatArray
+    place_m: FloatArray
 
 
 def predict(bench: Bench, motion: Trajectory, compensation: Compensation, fade_in_s: float) -> Errors:
     """Errors of the twin of a bench in closed loop, after the fade-in. Raises FieldError without a control law."""
+    found, first = in_closed_loop(bench, motion, compensation), round(fade_in_s / bench.period_s)
+    return Errors(float(np.sqrt(np.mean(found.following_m[first:] ** 2))), float(np.std(found.place_m[first:])))
+
+
+def in_closed_loop(bench: Bench, motion: Trajectory, compensation: Compensation) -> Simulated:
+    """Errors of the twin of a bench in closed loop. Raises FieldError without a control law."""
     gains, twin = bench.known_control.gains(bench.axis.ratio_m_rad), bench.twin()
     if not gains.position_from_table:  # what only the linear encoder misreads is no error of the table
         twin = replace(twin, active=tuple(one for one in twin.active if one.form.stage is not Stage.TABLE_READING))
@@ -70,7 +75,7 @@ def predict(bench: Bench, motion: Trajectory, compensation: Compensation, fade_i
     )
     table = response.table_position_m
     fed_back = table if gains.position_from_table else gains.ratio_m_rad * response.motor_position
-    return errors_of(position, added.position_m, fed_back, table, round(fade_in_s / gains.period_s))
+    return Simulated(position + added.position_m - fed_back, table - position)
 
 
 def drawn_benches(bench: Bench, result: Result, count: int, seed: int = 1) -> Iterator[Bench]:

@@ -107,7 +107,7 @@ def rms(values: Sequence[float]) -> float:
 def error_series(recording: Recording, bench: Bench, fade_in_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time [s], following error and positioning error without its mean [m], (n,) each, after approach and fade-in.
 
-    As `prediction.errors_of` has those of the twin; without a linear encoder the table is where the motor is.
+    As `prediction.in_closed_loop` has those of the twin; without a linear encoder the table is where the motor is.
     """
     approached_s = [one["end_s"] for one in recording.metadata.get("segments", ()) if one["kind"] == "approach"]
     ratio, first = bench.axis.ratio_m_rad, round((sum(approached_s) + fade_in_s) / bench.period_s)

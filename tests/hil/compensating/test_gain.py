@@ -13,7 +13,7 @@ from compensated_benches import EFFECTS, bench_of_effects, diagnosed, there_and_
 import hil
 from hil.bench.bench_file import Bench, load_bench
 from hil.compensating.compensate import Plan, plan_compensation, section_of
-from hil.compensating.prediction import Errors, errors_of, predict
+from hil.compensating.prediction import Errors, predict
 from hil.control.compensation_tables import OFF, Adds
 from hil.diagnosis.result import Correction, Finding, Result, Value
 from hil.recording.recording import Recording
@@ -23,14 +23,10 @@ FADE_S = 0.3
 
 
 def measured(run: Recording, ratio: float) -> Errors:
-    added = run.columns.get("compensation_position_m", np.zeros(len(run)))
-    return errors_of(
-        run["position_command_m"],
-        added,
-        ratio * run["motor_position_rad"],
-        run["table_position_m"],
-        round(FADE_S * 1e3),
-    )
+    first, added = round(FADE_S * 1e3), run.columns.get("compensation_position_m", np.zeros(len(run)))
+    following = (run["position_command_m"] + added - ratio * run["motor_position_rad"])[first:]
+    place = (run["table_position_m"] - run["position_command_m"])[first:]
+    return Errors(float(np.sqrt(np.mean(following**2))), float(np.std(place)))
 
 
 @pytest.fixture(scope="module")

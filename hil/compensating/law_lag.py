@@ -1,0 +1,54 @@
+"""What the control law needs beside the axis: its own lag, as torque over the acceleration and the velocity.
+
+A sampled law sees position and velocity late against its set-points, so it works against a feed-forward of the inertia
+alone: a lag T asks for Kv T a + Ki T v more, Kv and Ki of the velocity loop. T has parts of the rates, filters and
+delays; so both factors are taken from the twin in closed loop, by least squares on its following error.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.compensating.prediction import in_closed_loop
+from hil.control.compensation_tables import Adds, Compensation, CompensationTable, Over
+from hil.motion.trajectory import Trajectory
+
+_TRIED = 0.1  # of the largest value of a table: torque whose answer is simulated; the loop is linear where it slides
+
+
+def with_lag_of_law(
+    bench: Bench, motion: Trajectory, compensation: Compensation, fade_in_s: float
+) -> tuple[CompensationTable, ...]:
+    """The tables with those over acceleration and velocity enlarged, so that the twin follows a motion best.
+
+    They are as they were where that does not lessen its following error. Raises FieldError without a control law.
+    """
+    tables, first = compensation.tables, round(fade_in_s / bench.period_s)
+
+    def following(of: tuple[CompensationTable, ...]) -> FloatArray:
+        return in_closed_loop(bench, motion, replace(compensation, tables=of)).following_m[first:]
+
+    wanted = [one for one in tables if one.adds is Adds.TORQUE and one.over in (Over.ACCELERATION, Over.VELOCITY)]
+    lines = [_line(one, _TRIED * float(np.abs(one.forward).max())) for one in wanted]
+    if not lines:
+        return tables
+    before = following(tables)
+    answers = np.column_stack([following((*tables, line)) - before for line in lines])
+    factors = np.linalg.lstsq(answers, -before, rcond=None)[0]
+    added = {one.name: (line, float(factor)) for one, line, factor in zip(wanted, lines, factors, strict=True)}
+    larger = tuple(_sum(one, *added[one.name]) if one.name in added else one for one in tables)
+    return larger if np.sum(following(larger) ** 2) < np.sum(before**2) else tables
+
+
+def _line(table: CompensationTable, largest: float) -> CompensationTable:
+    """A torque in proportion to the quantity of a table."""
+    end = float(np.abs(table.at).max())
+    at, values = np.array([-end, end]), np.array([-largest, largest])
+    return CompensationTable("lag of the law", table.adds, table.over, at, values, values)
+
+
+def _sum(table: CompensationTable, line: CompensationTable, factor: float) -> CompensationTable:
+    more = factor * line.forward[-1] / line.at[-1] * table.at
+    return replace(table, forward=table.forward + more, backward=table.backward + more)

@@ -17,7 +17,7 @@ import math
 from typing import TYPE_CHECKING
 
 from hil.diagnosis.criteria import CRITERIA, Criteria
-from hil.diagnosis.ledger import SHAPE, Answer, Rule
+from hil.diagnosis.ledger import EXPLAINS, SHAPE, Answer, Rule
 from hil.diagnosis.reproduced import REPRODUCED
 
 if TYPE_CHECKING:
@@ -289,7 +289,7 @@ HELD_OUT: tuple[Rule[Ablation], ...] = (
 EXPLAINED: tuple[Rule[Remainder], ...] = (
     # the true mechanism in another form leaves little
     Rule(
-        "explains the mismatch",
+        EXPLAINS,
         "all terms leave {left:.1%} of the energy above the noise",
         "all terms leave {left:.1%} of the energy above the noise, a channel {above:.3g} times its noise (square)",
         _explains,

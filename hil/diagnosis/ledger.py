@@ -9,6 +9,7 @@ from hil.identification.terms import Key, Term
 Figures = Mapping[str, float | str]
 Answer = tuple[bool, Figures]
 SHAPE = "shape below the noise"  # name of the rule on what acts below the noise of a row
+EXPLAINS = "explains the mismatch"  # name of the rule on all terms together
 _M = TypeVar("_M", contravariant=True)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from example_result import EXAMPLE
 
+from hil.diagnosis.ledger import EXPLAINS
 from hil.diagnosis.result import AT_FLOOR, Result
 from hil.diagnosis.statement import statement
 from hil.twin.library import LIBRARY
@@ -54,10 +55,22 @@ def test_residuals_above_the_noise_are_a_mismatch() -> None:
     assert f"Structure is left: {TIME['text']}." in told
 
 
+def test_terms_that_explain_too_little_for_a_name_are_told_with_their_share() -> None:
+    left = {"description": "Residuals above the noise (rms): table position 3.71 times.", "share": 1.0}
+    rule = {"rule": EXPLAINS, "accepted": False, "text": "all terms leave 68.1 %", "figures": {"left": 0.681}}
+    near = {"effect": "periodic_lead_error", "named": False, "rules": (rule,)}
+    told = said(verdict="unexplained", unexplained=left, considered=(near,))
+    assert told.endswith(
+        "Closest comes periodic lead error with 31.9 % of the energy above the noise; below a half it is no answer."
+    )
+    nothing = near | {"rules": (rule | {"figures": {"left": 0.999}},)}
+    assert "Closest" not in said(verdict="unexplained", unexplained=left, considered=(nothing,))
+
+
 def test_a_search_that_ended_says_what_is_below_the_noise() -> None:
     budget = {"budget_s": 10.0, "stopped_before": "fitting", "not_tried": ()}
     told = said(verdict="unexplained", structure=(TIME,), time_budget=budget)
-    assert told == f"The time budget ended before a mechanism was found; below the noise of a row, {TIME['text']}."
+    assert told == f"The time budget ended before the mismatch was explained; below the noise of a row, {TIME['text']}."
 
 
 def test_parameters_that_are_only_better_together_are_told_by_the_torque() -> None:

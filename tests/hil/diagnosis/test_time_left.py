@@ -26,7 +26,7 @@ def test_a_search_without_time_names_nothing_and_lists_what_was_not_tried(tmp_pa
     assert ended is not None
     assert ended.not_tried == tuple(mechanism.id for mechanism in LIBRARY)
     assert result.verdict is Verdict.UNEXPLAINED
-    assert result.statement.startswith("The time budget ended before a mechanism was found")
+    assert result.statement.startswith("The time budget ended before the mismatch was explained")
     assert result.next_experiment is None
     assert "best explanation so far" in " ".join(result.notes)
     write_diagnosis(diagnosis, tmp_path)

@@ -5,7 +5,8 @@
 For each effect and seed: its parameters and wrong masses and friction are drawn and concealed; the axis is recorded,
 diagnosed, compensated and run on a motion that nothing was learnt from. A line for each case has the error that the
 effect makes (following for a torque, positioning for a place), rms: before, as predicted, after, their ratio, and what
-a repetition changes. The last lines count. Answers are kept in OUT; a stopped run continues.
+a repetition changes. The same tables are tried with a wrong diagnosis, and on an axis that has another
+strength, phase and mass since. The last lines count. Answers are kept in OUT; a stopped run continues.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from hil.errors import HilError
 from hil.loop.run import RunResult, run_profile
 from hil.motion.profile import Profile
 from hil.recording.recording import Recording, read_recording
+from hil.twin.library import BY_ID
+from hil.twin.parameter import Role
 from hil.validation.proof.draw.demo import LEARN, PROVE, WRONG, from_rest, there_and_back
 
 MOTION = from_rest("other strokes and feeds", [*there_and_back(0.09, 0.05), *there_and_back(0.06, 0.15)])
@@ -74,6 +77,12 @@ def main() -> None:
         print(f"predicted within 25 %: {sum(near)} of {len(near)}")
     harmed = [one for one in answers if one.get("after_m", 0.0) > one.get("before_m", 0.0) + one.get("noise_m", 0.0)]
     print(f"harmed: {len(harmed)} of {len(answers)}; named first: {sum(one['right'] for one in answers)}")
+    for kind in ("wrong", "changed"):
+        trials = [one[kind] for one in answers if "after_m" in one[kind]]
+        worse = sum(one["after_m"] > one["before_m"] + one["noise_m"] for one in trials)
+        print(
+            f"{kind}: {len(trials)} of {len(answers)} were run, worse than without by more than a repetition: {worse}"
+        )
 
 
 def told(one: dict[str, Any]) -> str:
@@ -110,23 +119,50 @@ def _answer(place: Path, effect: str, seed: int) -> dict[str, Any]:
     found = diagnose([learnt], [proved], given)
     named = [one.effect for one in found.result.missing]
     told: dict[str, Any] = {"named": named, "right": named[:1] == [effect]}
-    try:
-        trial = try_compensation(given, found.bench, found.result, {"other": MOTION}, place, run, FADE_S)
-    except HilError as error:
-        return told | {"ended": str(error)}
-    if not trial.motions:
-        return told | {"ended": trial.statement}
-    (before, after), (motion,) = trial.pairs(adds)[0], trial.motions
-    errors = {"before_m": before, "after_m": after, "noise_m": motion.noise_m(adds)}
-    predicted = before * motion.predicted.after.of(adds) / motion.predicted.before.of(adds)
-    return told | errors | {"predicted_m": predicted, "kept": [one.name for one in trial.plan.compensation.tables]}
+
+    def tried(machine: Bench, believed: Bench, folder: str = "") -> dict[str, Any]:
+        try:
+            trial = try_compensation(machine, believed, found.result, {"other": MOTION}, place / folder, run, FADE_S)
+        except HilError as error:
+            return {"ended": str(error)}
+        if not trial.motions:
+            return {"ended": trial.statement}
+        (before, after), (motion,) = trial.pairs(adds)[0], trial.motions
+        predicted = before * motion.predicted.after.of(adds) / motion.predicted.before.of(adds)
+        errors = {"before_m": before, "predicted_m": predicted, "after_m": after, "noise_m": motion.noise_m(adds)}
+        return errors | {"kept": [one.name for one in trial.plan.compensation.tables]}
+
+    changed = concealed(effect, ranges, seed + 100, WRONG | {"table_mass_kg": (1.2, 1.3)})
+    others = {"wrong": tried(given, mistaken(found.bench), "wrong"), "changed": tried(changed, found.bench, "changed")}
+    return told | tried(given, found.bench) | others
 
 
-def concealed(effect: str, ranges: dict[str, tuple[float, float]], seed: int) -> Bench:
-    """The reference bench with a concealed effect and wrong parameters, drawn by `seed`."""
+def mistaken(diagnosed: Bench) -> Bench:
+    """The bench of a wrong diagnosis: each strength twice as large with the other sign, or a phase half a turn later."""
+    entries = []
+    for entry in diagnosed.mechanisms:
+        values = dict(entry.parameters)
+        for parameter in BY_ID[entry.effect].parameters:
+            value = values.get(parameter.name)
+            if value is not None and parameter.role is Role.STRENGTH:
+                wrong = -2.0 * value if parameter.low < 0.0 else 2.0 * value
+                values[parameter.name] = min(max(wrong, parameter.low), parameter.high)
+            elif value is not None and parameter.role is Role.PHASE:
+                values[parameter.name] = value + np.pi if value < 0.0 else value - np.pi
+        entries.append(entry.model_copy(update={"parameters": values}))
+    return diagnosed.model_copy(update={"mechanisms": tuple(entries)})
+
+
+def concealed(
+    effect: str,
+    ranges: dict[str, tuple[float, float]],
+    seed: int,
+    wrong: dict[str, tuple[float, float]] = WRONG,
+) -> Bench:
+    """The reference bench with a concealed effect and `wrong` parameters, factors, drawn by `seed`."""
     bench, draw = load_bench("reference"), np.random.default_rng([seed, len(effect)])
     parameters = {name: float(draw.uniform(*limits)) for name, limits in ranges.items()}
-    axis = {name: float(getattr(bench.axis, name) * draw.uniform(*limits)) for name, limits in WRONG.items()}
+    axis = {name: float(getattr(bench.axis, name) * draw.uniform(*limits)) for name, limits in wrong.items()}
     effects = (SimulatedEffect(effect=effect, parameters=parameters),)
     return bench.model_copy(update={"simulation": SimulationSection(axis=axis, effects=effects, seed=seed)})
 

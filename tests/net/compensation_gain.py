@@ -138,7 +138,7 @@ def _answer(place: Path, effect: str, seed: int) -> dict[str, Any]:
 
 
 def mistaken(diagnosed: Bench) -> Bench:
-    """The bench of a wrong diagnosis: each strength twice as large with the other sign, or a phase half a turn later."""
+    """The bench of a wrong diagnosis: strengths twice as large, of the other sign, or half a turn later."""
     entries = []
     for entry in diagnosed.mechanisms:
         values = dict(entry.parameters)

@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Variant
+from hil.twin.mechanism import WIDTH, Moment, Stage, Variant
 from hil.twin.structure.chain import Chain
 
 
@@ -19,6 +21,16 @@ class Active:
     def form(self) -> Variant:
         """Its entry in the library."""
         return BY_ID[self.effect].variants[self.variant]
+
+    @property
+    def is_offset(self) -> bool:
+        """True for a torque or force that is the same at each time, place and speed of a sliding axis."""
+        if self.form.stage not in (Stage.MOTOR_TORQUE, Stage.TABLE_FORCE, Stage.BIAS):
+            return False
+        moments = (Moment(x, 0.0, 1e-3, 1e-4, 0.7 * x, x - 1.1, 0.3 * x, 1.0, 1.0) for x in (0.1, 0.9, 2.3, 71.0))
+        values = np.array(self.values)
+        added = {float(self.form.contribution(0.0, one, values, np.zeros(WIDTH))) for one in moments}
+        return len(added) == 1 and added != {0.0}
 
 
 @dataclass(frozen=True)

@@ -33,17 +33,18 @@ from hil.identification.noise_apart import smoothed_runs
 from hil.identification.parallel import in_parallel
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
+from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain, measured_motion
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.parameter import Role
+from hil.twin.physics import Active
 
 _FEWEST_ROWS = 100
 _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
 _ORDER = 24  # of the autoregressive model: as that of `hil.identification.inference`
 _RIDGE = 1e-4  # of white noise in the autocovariance: a filter that takes off a hundredth of the rms is far enough
-_ALIKE = 0.9  # of the energy of a shape: it is an offset; friction over time or place leaves more than a third
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
@@ -63,13 +64,16 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     if asked is None:
         return best
     searched, (shaped, share) = _searched(fit) - _searched(without), _faint(fit, without)
+    offset = any(
+        Active(term.effect, term.values, term.variant).is_offset for term in _added(fit, without)
+    )  # then one is the shape, and no nuisance
     for channel, own in asked.channels.items():
         after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
         shape = own.quiet - after
         if not np.isfinite(shape).all():
             continue
-        columns = np.column_stack([shape, own.beside_shape(shape)])
-        size, ratio, free = _first_coefficient(columns, own.measured, own.rows)
+        beside = own.beside[:, ~own.constant] if offset else own.beside
+        size, ratio, free = _first_coefficient(np.column_stack([shape, beside]), own.measured, own.rows)
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             if fitted:
                 removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
@@ -80,13 +84,17 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     return best
 
 
+def _added(fit: Fit, without: Fit) -> list[Term]:
+    known = {term.key for term in without.terms}
+    return [term for term in fit.terms if term.key not in known]
+
+
 def _faint(fit: Fit, without: Fit) -> tuple[Hypothesis, float]:
     """The fit, or the one without its term and little of the friction that it adds: of more the twin would stick.
 
     With the share of the term's strength.
     """
-    known = {term.key for term in without.terms}
-    added = [term for term in fit.terms if term.key not in known]
+    added = _added(fit, without)
     mechanism = BY_ID[added[-1].effect] if added else None
     if mechanism is None or mechanism.variants[added[-1].variant].stage is not Stage.COULOMB:
         return fit.hypothesis, 1.0
@@ -111,15 +119,6 @@ class _Seen(NamedTuple):
     beside: FloatArray
     constant: NDArray[np.bool_]
     least: float
-
-    def beside_shape(self, shape: FloatArray) -> FloatArray:
-        """The columns beside a shape (m,), without an offset where the shape is one itself."""
-        others = self.beside[:, ~self.constant]
-        pair = np.column_stack([shape, np.ones_like(shape)])
-        left = pair - others @ np.linalg.lstsq(others, pair, rcond=_RANK)[0] if others.size else pair
-        energies = np.einsum("ij,ij->j", left, left)
-        alike = float(left[:, 0] @ left[:, 1]) ** 2 > _ALIKE * float(energies[0] * energies[1])
-        return others if alike else self.beside
 
 
 class _Asked(NamedTuple):

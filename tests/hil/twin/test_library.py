@@ -16,7 +16,8 @@ from hil.twin import mechanisms
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.maps import MAPS
 from hil.twin.mechanism import PARAMETERS, WIDTH, Block, Mechanism, Moment, SearchHints, Stage, Text, Variant
-from hil.twin.parameter import Dimension, Role
+from hil.twin.parameter import Dimension, Parameter, Role
+from hil.twin.physics import Active
 from hil.twin.scene import AxisFacts
 from hil.twin.structure.chain import two_mass
 
@@ -222,3 +223,18 @@ def test_no_name_applies_to_a_strength_at_the_bound_without_effect(mechanism: Me
         typical[index] = max(mechanism.parameters[index].low, 0.0) + 2e-20
     assert not mechanism.is_valid(typical, 0, axis)
     assert any(mechanism.is_valid(mechanism.typical_values(axis), form, axis) for form in range(len(mechanism.forms)))
+
+
+def test_an_offset_is_what_adds_one_torque_at_each_time_place_and_speed() -> None:
+    found = {
+        (mechanism.id, variant)
+        for mechanism in LIBRARY
+        for variant in range(len(mechanism.variants))
+        if Active(mechanism.id, tuple(_inside(one) for one in mechanism.parameters), variant).is_offset
+    }
+    assert found == {("constant_load", 0), ("asymmetric_friction", 0)}
+    assert not Active("constant_load", (0.0,)).is_offset
+
+
+def _inside(parameter: Parameter) -> float:
+    return 0.5 * (max(parameter.low, -1.0) + min(parameter.high, 2.0)) + 0.013

@@ -28,7 +28,7 @@ from hil.control.compensation_tables import Adds, CompensationTable
 from hil.diagnosis.result import Result
 from hil.errors import HilError
 from hil.motion.profile import Profile
-from hil.motion.trajectory import plan
+from hil.motion.trajectory import SegmentRun, plan
 from hil.quantities import quantity
 from hil.recording.recording import Recording, read_recording
 
@@ -109,8 +109,9 @@ def error_series(recording: Recording, bench: Bench, fade_in_s: float) -> tuple[
 
     As `prediction.in_closed_loop` has those of the twin; without a linear encoder the table is where the motor is.
     """
-    approached_s = [one["end_s"] for one in recording.metadata.get("segments", ()) if one["kind"] == "approach"]
-    ratio, first = bench.axis.ratio_m_rad, round((sum(approached_s) + fade_in_s) / bench.period_s)
+    segments = [SegmentRun(**one) for one in recording.metadata.get("segments", ())]
+    approached_s = sum(one.end_s for one in segments if one.kind == "approach")
+    ratio, first = bench.axis.ratio_m_rad, round((approached_s + fade_in_s) / bench.period_s)
     command, motor = recording["position_command_m"], ratio * recording[recording.axis.motor_position]
     table = recording.columns.get("table_position_m", motor)
     added = recording.columns.get("compensation_position_m", np.zeros(len(recording)))

@@ -48,7 +48,7 @@ MECHANISM = Mechanism(
     id="local_friction",
     block=Block.MOTOR_SIDE,
     element="ball screw, guideways or covers",
-    equation="F = Fc (1 + a s(x)), s = 1 in the zone, 0 outside, straight flanks; half height at `from` and `to`",
+    equation="F = Fc (1 + a s(x)), s = 1 in the zone, 0 outside, straight flanks; half height at its begin and end",
     source="Armstrong-Hélouvry, Control of Machines with Friction (1991), position-dependent friction",
     parameters=(
         Parameter("fraction", Dimension.RATIO, -0.9, 5.0, role=Role.STRENGTH),

@@ -151,6 +151,8 @@ def try_compensation(
     made = plan_compensation(bench, widest, result, fade_in_s)
     unit = "rad" if bench.axis.turns else "m"
     made, untried = _that_can_be_judged(given, made)
+    if given.tables().tables:
+        untried.append(("compensation of the bench", "off in all these runs; what is kept takes its place"))
     if made.harms or not made.compensation.tables:
         return Trial(None, made, (), (*made.derived.left_out, *untried), fade_in_s, unit)
 

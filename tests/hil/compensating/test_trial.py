@@ -78,6 +78,14 @@ def test_a_wrong_table_is_left_out_and_the_axis_is_no_worse(
     assert trial.section is not None
 
 
+def test_a_compensation_that_the_bench_has_is_said_to_be_off(tmp_path: Path) -> None:
+    trial = tried(tmp_path / "first", diagnosed())
+    assert trial.section
+    again = tried(tmp_path / "again", diagnosed(), bench_of_effects(compensation=trial.section))
+    assert ("compensation of the bench", "off in all these runs; what is kept takes its place") in again.left_out
+    assert again.pairs(Adds.POSITION)[0][0] == pytest.approx(trial.pairs(Adds.POSITION)[0][0], rel=0.02)
+
+
 def test_a_run_that_stops_ends_the_trial(tmp_path: Path) -> None:
     data = bench_of_effects().model_dump(mode="json")
     data["drive"]["following_error_m"] = 1e-6

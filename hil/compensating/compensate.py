@@ -13,7 +13,7 @@ from hil.compensating.derive import Derived, derive, limits_of, reach_of
 from hil.compensating.law_lag import with_lag_of_law
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of, predict
 from hil.compensating.shapes import shapes
-from hil.control.compensation_tables import Adds, Compensation, CompensationTable
+from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable
 from hil.diagnosis.result import Result
 from hil.errors import HilError
 from hil.motion.trajectory import Trajectory
@@ -62,9 +62,12 @@ def plan_compensation(bench: Bench, motion: Trajectory, result: Result | None, f
     derived = derive(bench, reach, fade_in_s)
     if not derived.compensation.tables:
         raise HilError("nothing of this bench can be compensated by a table")
-    tables = with_lag_of_law(bench, motion, derived.compensation, fade_in_s)
-    limits = limits_of(tables, reach, bench.gains.torque_limit_n_m, fade_in_s)
-    compensation = replace(derived.compensation, tables=tables, limits=limits)
+
+    def limits(tables: Sequence[CompensationTable]) -> CompensationLimits:
+        return limits_of(tables, reach, bench.gains.torque_limit_n_m, fade_in_s)
+
+    tables = with_lag_of_law(bench, motion, derived.compensation, fade_in_s, limits)
+    compensation = replace(derived.compensation, tables=tables, limits=limits(tables))
     derived = replace(derived, compensation=compensation)
     drawn = tuple(drawn_benches(bench, result, DRAWS)) if result is not None else ()
     gain = gain_of(bench, motion, compensation, drawn, fade_in_s)

@@ -2,9 +2,11 @@
 
 A sampled law sees position and velocity late against its set-points, so it works against a feed-forward of the inertia
 alone: a lag T asks for Kv T a + Ki T v more, Kv and Ki of the velocity loop. T has parts of the rates, filters and
-delays; so both factors are taken from the twin in closed loop, by least squares on its following error.
+delays; so both factors are taken from the twin in closed loop, by least squares on its following error and on the
+place of its table: where the motor overshoots, friction holds the table.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,34 +14,41 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.compensating.prediction import in_closed_loop
-from hil.control.compensation_tables import Adds, Compensation, CompensationTable, Over
+from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable, Over
 from hil.motion.trajectory import Trajectory
 
 _TRIED = 0.1  # of the largest value of a table: torque whose answer is simulated; the loop is linear where it slides
 
 
 def with_lag_of_law(
-    bench: Bench, motion: Trajectory, compensation: Compensation, fade_in_s: float
+    bench: Bench,
+    motion: Trajectory,
+    compensation: Compensation,
+    fade_in_s: float,
+    limits: Callable[[Sequence[CompensationTable]], CompensationLimits],
 ) -> tuple[CompensationTable, ...]:
-    """The tables with those over acceleration and velocity enlarged, so that the twin follows a motion best.
+    """The tables with those over acceleration and velocity enlarged, so that the twin errs least on a motion.
 
-    They are as they were where that does not lessen its following error. Raises FieldError without a control law.
+    They are as they were where that does not lessen its errors. `limits`: those for tables. Raises FieldError without a
+    control law.
     """
     tables, first = compensation.tables, round(fade_in_s / bench.period_s)
 
-    def following(of: tuple[CompensationTable, ...]) -> FloatArray:
-        return in_closed_loop(bench, motion, replace(compensation, tables=of)).following_m[first:]
+    def errors(of: tuple[CompensationTable, ...]) -> FloatArray:
+        found = in_closed_loop(bench, motion, replace(compensation, tables=of, limits=limits(of)))
+        place = found.place_m[first:]
+        return np.concatenate([found.following_m[first:], place - place.mean()])
 
     wanted = [one for one in tables if one.adds is Adds.TORQUE and one.over in (Over.ACCELERATION, Over.VELOCITY)]
     lines = [_line(one, _TRIED * float(np.abs(one.forward).max())) for one in wanted]
     if not lines:
         return tables
-    before = following(tables)
-    answers = np.column_stack([following((*tables, line)) - before for line in lines])
+    before = errors(tables)
+    answers = np.column_stack([errors((*tables, line)) - before for line in lines])
     factors = np.linalg.lstsq(answers, -before, rcond=None)[0]
     added = {one.name: (line, float(factor)) for one, line, factor in zip(wanted, lines, factors, strict=True)}
     larger = tuple(_sum(one, *added[one.name]) if one.name in added else one for one in tables)
-    return larger if np.sum(following(larger) ** 2) < np.sum(before**2) else tables
+    return larger if np.sum(errors(larger) ** 2) < np.sum(before**2) else tables
 
 
 def _line(table: CompensationTable, largest: float) -> CompensationTable:

@@ -1,9 +1,9 @@
-"""What the control law needs beside the axis: its own lag, as torque over the acceleration and the velocity.
+"""Torque that the lag of the control law needs, over the acceleration and the velocity.
 
 A sampled law sees position and velocity late against its set-points, so it works against a feed-forward of the inertia
 alone: a lag T asks for Kv T a + Ki T v more, Kv and Ki of the velocity loop. T has parts of the rates, filters and
 delays; so both factors are taken from the twin in closed loop, by least squares on its following error and on the
-place of its table: where the motor overshoots, friction holds the table.
+place of its table. A motor that follows better may overshoot a stop, where friction holds the table: it gets less.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,8 +29,8 @@ def with_lag_of_law(
 ) -> tuple[CompensationTable, ...]:
     """The tables with those over acceleration and velocity enlarged, so that the twin errs least on a motion.
 
-    They are as they were where that does not lessen its errors. `limits`: those for tables. Raises FieldError without a
-    control law.
+    They are enlarged by less, or not at all, where the table then rests elsewhere by more than a count of its encoder.
+    `limits`: those for tables. Raises FieldError without a control law.
     """
     tables, first = compensation.tables, round(fade_in_s / bench.period_s)
 
@@ -47,8 +47,22 @@ def with_lag_of_law(
     answers = np.column_stack([errors((*tables, line)) - before for line in lines])
     factors = np.linalg.lstsq(answers, -before, rcond=None)[0]
     added = {one.name: (line, float(factor)) for one, line, factor in zip(wanted, lines, factors, strict=True)}
-    larger = tuple(_sum(one, *added[one.name]) if one.name in added else one for one in tables)
-    return larger if np.sum(errors(larger) ** 2) < np.sum(before**2) else tables
+    encoder = bench.encoders.table
+    count_m = encoder.resolution_m if encoder is not None else np.inf
+    at_rest = np.flatnonzero(np.asarray(motion.velocity_m_s)[first:] == 0.0) + before.size // 2
+    for share in (1.0, 0.5, 0.25):
+        larger = tuple(
+            _sum(one, added[one.name][0], share * added[one.name][1]) if one.name in added else one for one in tables
+        )
+        after = errors(larger)
+        moved = _rms(after[at_rest]) - _rms(before[at_rest])
+        if np.sum(after**2) < np.sum(before**2) and moved <= count_m:
+            return larger
+    return tables
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
 def _line(table: CompensationTable, largest: float) -> CompensationTable:

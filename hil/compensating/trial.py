@@ -50,7 +50,7 @@ class TriedMotion:
     recordings: tuple[Recording, Recording]
 
     def noise_m(self, adds: Adds) -> float:
-        """How far an error differs between the two runs before."""
+        """Difference of an error between the two runs without compensation [m]."""
         return _repetition_m(self.before, adds)
 
 

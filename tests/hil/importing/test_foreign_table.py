@@ -74,7 +74,7 @@ def twincat(path: Path) -> None:
 
 
 def twincat_filled(path: Path) -> None:
-    """As TwinCAT writes it: lines about the file have as many fields as the rows, the units stand in a row of their own."""
+    """As TwinCAT writes it: lines about the file are as wide as the rows, units stand in a row of their own."""
     names = "Name\tAxis1.SetPos\tName\tAxis1.ActAngle\tName\tAxis1.ActTorque"
     comment = "SymbolComment\tmm\tSymbolComment\trad\tSymbolComment\tNm"
     facts = "Name\tScope Project\t\t\t\t\nFile\ta.svdx\t\t\t\t\nStarttime\t133547712\tTuesday\t14:20:00.000\t\t"

@@ -147,21 +147,20 @@ def _moves(of: Ablation, c: Criteria) -> Answer:
 
 
 def _torque(of: Addition | Ablation, c: Criteria) -> Answer | None:
-    if of.torque is None:  # an error of a sensor, or not told
+    if of.torque is None:  # not told
         return None
     left, without = of.torque
     return left - without <= c.discrepancy, {"left": left, "without": without}
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
-    """Little is left, or noise beside what is explained; with open inputs, or at the floor, most is explained."""
+    """Little is left beside noise; with open inputs, or at the floor, most is explained."""
     stands = (
-        (of.noise and of.left < 1.0)
-        or names_stand(of.left, of.above, c)
+        (of.left < 1.0 and names_stand(of.told, of.above, c))
         or (of.open_inputs and of.left <= c.most_left)
         or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))
     )
-    return stands, {"left": of.left, "above": of.above}
+    return stands, {"left": of.told, "above": of.above}
 
 
 def names_stand(left: float, above: float, c: Criteria = CRITERIA) -> bool:
@@ -193,7 +192,7 @@ _SHAPE: Rule[Addition | Need] = Rule(
     "its shape is not in what the twin leaves below the noise (by chance {chance:.1g}): it only passes less noise",
     _shape,
 )
-# a torque on the axis shows in the torque; errors of sensors may not
+# the motion that a sensor gives, and the torques on the axis, show in the torque that it needs
 _TORQUE: Rule[Addition | Ablation] = Rule(
     "torque",
     "the torque of the motion is predicted no worse with it",

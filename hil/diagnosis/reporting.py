@@ -22,7 +22,7 @@ from hil.diagnosis.result import (
 )
 from hil.diagnosis.stages import Judged, Progress, Reported
 from hil.diagnosis.statement import statement
-from hil.diagnosis.structure_left import Dependence
+from hil.diagnosis.structure_left import Dependence, like_noise
 from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of
 from hil.diagnosis.verdict.fit_table import closed_loop_held, fit_table
 from hil.diagnosis.verdict.in_bench import in_bench
@@ -165,7 +165,11 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
         return Unexplained(share=share, description=AT_FLOOR)
-    text = ", ".join(f"{spoken(name)} {digits(above[name])} times" for name in sorted(above, key=lambda n: -above[n]))
+    alike = {names[name] for name in like_noise(final, judged.structure)}
+    text = ", ".join(
+        f"{spoken(name)} {digits(above[name])} times" + (" (no structure)" if name in alike else "")
+        for name in sorted(above, key=lambda n: -above[n])
+    )
     if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:
         text += f"; {where_in_short(location, final.bench.axis.turns)}"
     return Unexplained(share=share, description=f"Residuals above the noise (rms): {text}.")

@@ -29,6 +29,7 @@ _MOST_PERIODS = 4000  # of a line over the travel
 _SEEN = 4.0  # bins of the position per period, from which they show it
 POSITION, SPEED, OFFSET = "position", "speed", "offset"
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
+_RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that shows it
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +123,23 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         and (one.held_out is None or one.held_out > 0.0)
     ]
     return tuple(sorted(counted, key=lambda one: -one.explained))
+
+
+def like_noise(fit: Fit, left: Sequence[Dependence]) -> frozenset[str]:
+    """Channels of the twin whose remainder depends on nothing, as far as its rows can tell: noise, white or not.
+
+    Sensors wander, and a torque has noise of its own. None where the input of the twin has no error: a twin leaves
+    nothing then.
+    """
+    plain = fit_plain(fit.data)
+    if fit.data.observability.exact_input or plain is None:
+        return frozenset()
+    told = {one.channel for one in left}
+    return frozenset(
+        _RESIDUAL[channel]
+        for channel in channels(fit.data)
+        if channel not in told and offset(left_in_channel(fit.hypothesis, fit.data, channel, plain)) is not None
+    )
 
 
 def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:

@@ -17,7 +17,7 @@ between stretches that slide, where the sign of the velocity is not known, it go
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -68,17 +68,17 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
     return math.inf if left is None else left
 
 
-def mismatch_left(before: Fit, after: Fit, data: Dataset) -> float:
+def mismatch_left(before: Fit, after: Fit, data: Dataset, noise: Collection[str] = ()) -> float:
     """Share of the energy above the floor of a fit on a data set that another leaves, in [0, 1].
 
     The position of the motor counts slow motion and bursts more than all other motion. Where the torque that it needs
-    beyond the twin's falls more, that is its share.
+    beyond the twin's falls more, that is its share. What is left of the channels `noise` does not count.
     """
     was, left = (dict(fit.on(data).excess_by_channel) for fit in (before, after))
     missed, missing = torque_missed(before, data), torque_missed(after, data)
     if missed and missing is not None and math.isfinite(missed):
         left["motor"] = min(left["motor"], was["motor"] * (missing / missed) ** 2)
-    total, rest = sum(was.values()), sum(left.values())
+    total, rest = sum(was.values()), sum(value for name, value in left.items() if name not in noise)
     return min(rest / total, 1.0) if total > 0.0 else float(rest > 0.0)
 
 

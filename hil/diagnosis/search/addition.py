@@ -24,7 +24,7 @@ from hil.identification.terms import Term
 from hil.identification.torque_left import torque_missed
 from hil.identification.twin_deviation import in_measured_torque
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Block
+from hil.twin.mechanism import Block, Stage
 
 
 @dataclass(frozen=True)
@@ -152,10 +152,12 @@ def removed_by_channel(without: Fit, fit: Fit, reference: Fit) -> dict[str, floa
 def torque_of(fit: Fit, without: Fit, term: Term, data: Dataset) -> tuple[float, float] | None:
     """Torque missed on recordings with a term of the plant and without it; None where the torque says nothing of it.
 
-    An error of the transmission is no torque on an axis without a spring.
+    An error of the transmission is no torque on an axis without a spring. One of the motor's encoder is: a motion that
+    is read late, or wrong over the angle, needs another torque.
     """
     mechanism = BY_ID[term.effect]
-    if mechanism.block in (Block.CONTROLLER, Block.SENSOR) or in_measured_torque(term) or term.windows:
+    late = mechanism.variants[term.variant].stage is Stage.CHANNEL
+    if mechanism.block is Block.CONTROLLER or (in_measured_torque(term) and not late) or term.windows:
         return None
     if mechanism.in_transmission and not fit.bench.axis.SPRINGS:
         return None

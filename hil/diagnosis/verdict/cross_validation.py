@@ -44,7 +44,7 @@ class Ablation:
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
     `quiet`: it hardly acts on motion without noise. `torque`: that which held-out motion needs beyond that
-    of the twin, over its deviation (rms), with the term and without; None for an error of a sensor. `harm`:
+    of the twin, over its deviation (rms), with the term and without; None where it says nothing. `harm`:
     each channel with it and without it.
     """
 

@@ -2,14 +2,20 @@
 
 from dataclasses import replace
 
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.events import with_events_of
 from hil.diagnosis.search.forward_selection import over
 from hil.diagnosis.stages import Searched, Tested
+from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
 from hil.diagnosis.verdict.findings import renamed, rivals_of
 from hil.diagnosis.verdict.refit import reported_refit
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
 from hil.identification.noise_apart import noise_apart
 from hil.identification.torque_left import fit_plain
+
+_TABLE = "table"  # channel of the twin
 
 
 def test_on_held_out(searched: Searched) -> Tested:
@@ -20,6 +26,7 @@ def test_on_held_out(searched: Searched) -> Tested:
     nominal, held_out, final = searched.nominal, searched.prepared.held_out, renamed(searched.final)
     if not searched.stopped_at or any(term.windows for term in final.terms):
         final = with_events_of(held_out, final)
+    final = with_own_noise(final, held_out)
     data, plain = final.data, fit_plain(final.data)
     rivals = {term.key: rivals_of(searched, term) for term in final.terms}
     if data is searched.prepared.train:
@@ -30,6 +37,18 @@ def test_on_held_out(searched: Searched) -> Tested:
         there = noise_apart(there, reference.hypothesis, plain)
     proof = cross_validate(over(data, nominal), final, there, rivals)
     return _tested(searched, replace(proof, final=over(searched.prepared.train, proof.final, 1)))
+
+
+def with_own_noise(fit: Fit, held_out: Dataset) -> Fit:
+    """The fit of terms, with what it leaves of the second encoder as its noise, if that is like noise.
+
+    A sensor that wanders far above its white noise bends masses and friction.
+    """
+    ratio = max(ratios.get(_TABLE, 0.0) for ratios in fit.noise_ratios)
+    if not fit.terms or ratio <= CRITERIA.floor or _TABLE not in like_noise(fit, structure_left(fit, held_out)):
+        return fit
+    known = fit.data.set_aside
+    return over(fit.data.louder({**known, _TABLE: known.get(_TABLE, 1.0) * ratio**0.5}), fit)
 
 
 def _tested(searched: Searched, proof: CrossValidation) -> Tested:

@@ -1,5 +1,6 @@
 """Verdict on plant and control law, from the fits at the bench file's values, refitted, and with terms."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
-from hil.diagnosis.structure_left import structure_left
+from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.findings import corrections
 from hil.diagnosis.verdict.reproduction import reproduction
@@ -23,18 +24,18 @@ from hil.identification.torque_left import mismatch_left
 
 @dataclass(frozen=True)
 class Remainder:
-    """What all terms together leave: share of the energy above the floor, largest mean square of a channel over noise.
+    """What all terms together leave: share of the energy above the floor.
 
-    `open_inputs`: inputs of the twin are open or nothing is known of the control law, so that something is left beside
-    any name. `at_floor`: the training recordings are explained. `noise`: the torque is noisy, and
-    what is left depends on nothing.
+    `told` is the share without the channels whose remainder is like noise (`like_noise`), `above` the largest mean
+    square of the others over their noise. `open_inputs`: inputs of the twin are open or nothing is known of the control
+    law, so that something is left beside any name. `at_floor`: the training recordings are explained.
     """
 
     left: float
+    told: float
     above: float
     open_inputs: bool
     at_floor: bool
-    noise: bool
 
 
 def judge(tested: Tested) -> Judged:
@@ -81,19 +82,24 @@ def given_stands(given: Fit, held_out: Dataset) -> bool:
 def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
     """Answer of the rule on all terms together."""
     coarse = any(run.noise.coarse for run in (*final.data.runs, *held_out.runs))
+    noise = like_noise(final, structure_left(final, held_out))
+    of_runs = [ratios for data in (final.data, held_out) if data.runs for ratios in final.on(data).noise_ratios]
     measured = Remainder(
         left=unexplained_share(nominal, final, held_out),
-        above=max(final.on(data).worst_ratio for data in (final.data, held_out) if data.runs),
+        told=unexplained_share(nominal, final, held_out, noise),
+        above=max((ratio for ratios in of_runs for name, ratio in ratios.items() if name not in noise), default=0.0),
         open_inputs=coarse or not final.data.observability.closed_loop,
         at_floor=final.at_floor,
-        noise=not final.data.observability.exact_input and not structure_left(final, held_out),
     )
     return examine(EXPLAINED, measured, CRITERIA)
 
 
-def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset) -> float:
-    """Share of the energy above the floor that the terms leave, on held-out recordings if there are any."""
-    return mismatch_left(nominal, final, held_out if held_out.runs else final.data)
+def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset, noise: Collection[str] = ()) -> float:
+    """Share of the energy above the floor that the terms leave, on held-out recordings if there are any.
+
+    What is left of the channels `noise` does not count.
+    """
+    return mismatch_left(nominal, final, held_out if held_out.runs else final.data, noise)
 
 
 def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:

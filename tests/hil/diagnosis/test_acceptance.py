@@ -182,16 +182,19 @@ def test_less_torque_held_out_outweighs_the_position() -> None:
 
 
 def test_open_inputs_leave_something_beside_a_right_name() -> None:
-    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False, "noise": False}
+    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False, "told": 0.3}
     closed: Any = SimpleNamespace(**measured)
     opened: Any = SimpleNamespace(**(measured | {"open_inputs": True}))
     assert not accepted(examine(EXPLAINED, closed, CRITERIA))
     assert accepted(examine(EXPLAINED, opened, CRITERIA))
 
 
-def test_noise_of_any_colour_beside_a_name_is_no_mismatch() -> None:
-    left: Any = SimpleNamespace(left=0.96, above=20.0, open_inputs=False, at_floor=False, noise=True)
-    assert accepted(examine(EXPLAINED, left, CRITERIA))
+@pytest.mark.parametrize(("left", "told", "stands"), [(0.96, 0.0, True), (0.96, 0.96, False), (1.0, 0.0, False)])
+def test_noise_of_any_colour_beside_a_name_that_explains_something_is_no_mismatch(
+    left: float, told: float, stands: bool
+) -> None:
+    of: Any = SimpleNamespace(left=left, told=told, above=20.0, open_inputs=False, at_floor=False)
+    assert accepted(examine(EXPLAINED, of, CRITERIA)) is stands
 
 
 def test_a_score_must_promise_evidence_and_energy() -> None:

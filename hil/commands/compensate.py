@@ -27,16 +27,21 @@ def compensate(
         list[Controller] | None,
         typer.Option("--for", help="Write the tables for this controller too, beside the bench file; repeatable."),
     ] = None,
+    tuned: Annotated[
+        bool, typer.Option("--tune", help="Take the proposed gains of both loops too; the tables are made for them.")
+    ] = False,
 ) -> None:
     """Turn a diagnosis into a compensation: tables, the gain that they promise, and the bench file that has them."""
     from datetime import date
 
     from hil.bench.bench_file import Bench, load_bench
     from hil.commands.warm_up import compile_kernels
-    from hil.compensating.compensate import plan_compensation, section_of, taken_by_drive
+    from hil.compensating.compensate import DRAWS, plan_compensation, section_of, taken_by_drive
     from hil.compensating.controllers.write_controllers import controller_files, write_files
     from hil.compensating.derive import size
-    from hil.control.compensation_tables import Adds
+    from hil.compensating.loop_tuning import rows_of, tune
+    from hil.compensating.prediction import drawn_benches, predict
+    from hil.control.compensation_tables import OFF, Adds
     from hil.diagnosis.result import Result
     from hil.errors import HilError, InputError
     from hil.files.input_file import is_file
@@ -54,6 +59,21 @@ def compensate(
     result = Result.model_validate_json(found.read_text(encoding="utf-8")) if is_file(found) else None
     motion = plan(load_profile(profile), diagnosed.period_s)
     compile_kernels()
+    drawn = tuple(drawn_benches(diagnosed, result, DRAWS)) if result is not None else ()
+    loops = tune(diagnosed, drawn)
+    header = ("gains", "loop", "law", "crossover", "gain margin", "phase margin", "modulus (worst)")
+    table(header, rows_of(loops), right=False)
+    out.print("Tables go by set-points alone, so that margins with them are those without.")
+    if tuned:
+        if len(loops) == 1:
+            raise HilError("nothing written: no gains keep the margins on this axis; leave out --tune")
+        proposed = diagnosed.known_control.with_gains(loops[1].gains)
+        given, diagnosed = diagnosed, diagnosed.model_copy(update={"control": proposed})
+        errors = [predict(one, motion, OFF, fade_in_s).following_m for one in (given, diagnosed)]
+        unit = "rad" if diagnosed.axis.turns else "m"
+        out.print(
+            f"Predicted following error, rms, by the gains alone: {' -> '.join(quantity(e, unit) for e in errors)}"
+        )
     made = plan_compensation(diagnosed, motion, result, fade_in_s)
     taken, not_taken = taken_by_drive(diagnosed, made)
     if not taken.compensation.tables and not controllers:

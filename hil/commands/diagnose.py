@@ -38,6 +38,7 @@ def diagnose(
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
     from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
+    from hil.compensating.old_tables import old_tables, reach_of_recording
     from hil.diagnosis.diagnose import diagnose as diagnose_recordings
     from hil.files.optional_library import page_line
     from hil.files.output import default_folder, new_folder
@@ -55,6 +56,9 @@ def diagnose(
         with progress() as tell:
             diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
         print_diagnosis(diagnosis.result)
+        if believed.tables().tables and believed.law_known:
+            for line in old_tables(diagnosis.bench, reach_of_recording(train[0], believed)):
+                out.print(line)
         with progress() as tell:
             tell("writing the report")
             write_diagnosis(diagnosis, part, bench_file=given_or_shipped(bench, "bench") if bench else None)

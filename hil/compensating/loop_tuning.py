@@ -1,0 +1,245 @@
+"""Gains of both loops, and a notch, for the identified axis, with the margins that they leave.
+
+    velocity loop   L(z) = N C V P D      notch, PI law, velocity from positions, sampled plant, dead time
+    position loop   its samples see the closed velocity loop (`hil.twin.structure.frequency.position_loop`)
+
+PI law: the most integral gain Kp / Ti whose sensitivity |1 / (1 + L)| nowhere exceeds `MOST_SENSITIVE` (MIGO design: K.
+J. Åström, H. Panagopoulos, T. Hägglund, Automatica 34 (1998) 585); a P law: the most gain. Position loop: the most gain
+without a peak, so that a contour is not overshot. Both hold for the diagnosed axis and for each draw of it within its
+standard errors. A notch takes a mode out of the velocity loop; it is proposed where the law gains by it.
+
+Dead times and lags of the drive count as dead time: that is the more careful of the two.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.bench.bench_file import Bench
+from hil.control.cascade import Gains
+from hil.frequency.margins import StabilityMargins, stability_margins
+from hil.frequency.twin_curves import LOWEST_HZ, POINTS, sampled_plant
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Stage
+from hil.twin.parameter import Dimension
+from hil.twin.picture import Picture
+from hil.twin.structure.frequency import ComplexArray, laplace, position_loop, velocity_law
+
+MOST_SENSITIVE = 2.0  # a phase margin of at least 29 degrees and a gain margin of 2 (Åström, Murray 2008, ch. 9)
+PEAK = 1.06  # of the closed position loop: half a decibel
+WORTH = 1.2  # gain by a notch from which it is proposed
+_FACTORS = np.geomspace(1.0 / 16.0, 16.0, 97)  # of the gains as they are: 6 % apart
+_TIMES = np.geomspace(1.0 / 16.0, 16.0, 33)  # of the integral time
+_NARROW, _WIDE, _AROUND = 5.0, 0.5, 101  # widths of a mode that the frequencies cover densely; damping of a notch
+
+
+@dataclass(frozen=True)
+class Notch:
+    """(s^2 + 2 z w s + w^2) / (s^2 + 2 d w s + w^2) with the damping ratios z of the mode and d of the filter."""
+
+    frequency_hz: float
+    damping_ratio: float
+    filter_damping_ratio: float = _WIDE
+
+    def response(self, z: ComplexArray, period_s: float) -> ComplexArray:
+        """Response (k,) by the bilinear transform that keeps the notch's frequency."""
+        w = 2.0 * pi * self.frequency_hz
+        s = w / np.tan(0.5 * w * period_s) * (z - 1.0) / (z + 1.0)
+        passed, filtered = (s**2 + 2.0 * d * w * s + w**2 for d in (self.damping_ratio, self.filter_damping_ratio))
+        return np.asarray(passed / filtered, dtype=np.complex128)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopMargins:
+    """Gains and notch with the margins of the loops; `least`: modulus margins of both in the worst of all draws."""
+
+    gains: Gains
+    notch: Notch | None
+    velocity: StabilityMargins
+    position: StabilityMargins
+    least: tuple[float, float]
+
+
+class _Axis:
+    """Plant and loops of one bench at frequencies that cover its modes."""
+
+    def __init__(self, bench: Bench, gains: Gains) -> None:
+        twin = bench.twin()
+        self.dead_time_s, self.period_s, self.twin = dead_time_s(bench), gains.period_s, twin
+        highest = 0.499 / self.period_s
+        modes = twin.modal.frequency_rad_s / (2.0 * pi)
+        self.modes = [(f, z) for f, z in zip(modes, twin.modal.damping_ratio, strict=True) if LOWEST_HZ < f < highest]
+        near = [f * (1.0 + np.linspace(-1.0, 1.0, _AROUND) * min(_NARROW * max(z, 1e-4), 0.5)) for f, z in self.modes]
+        grid = np.unique(np.concatenate([np.geomspace(LOWEST_HZ, highest, POINTS), *near]))
+        self.hz = grid[(grid >= LOWEST_HZ) & (grid <= highest)]
+        self.z = np.exp(laplace(self.hz) * self.period_s)
+
+    def plant(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Held torque command to motor and table angle at z."""
+        late = np.exp(-np.log(z) * self.dead_time_s / self.period_s)
+        motor, table = sampled_plant(self.twin, self.period_s)(z)
+        return motor * late, table * late
+
+    @cached_property
+    def motor(self) -> ComplexArray:
+        """Held torque command to the motor's angle at all frequencies."""
+        return self.plant(self.z)[0]
+
+    def velocity_loop(self, gains: Gains, notch: Notch | None) -> ComplexArray:
+        """Open velocity loop (k,)."""
+        law, velocity = velocity_law(gains, self.z)
+        opened = law * velocity * self.motor
+        return opened if notch is None else opened * notch.response(self.z, self.period_s)
+
+    def position_loop(self, gains: Gains, notch: Notch | None) -> tuple[FloatArray, ComplexArray]:
+        """Frequencies and open position loop below half of its rate."""
+
+        def plant(z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+            motor, table = self.plant(z)
+            filtered = 1.0 if notch is None else notch.response(z, self.period_s)
+            return motor * filtered, table * filtered
+
+        hz = self.hz[self.hz < 0.499 / (self.period_s * gains.position_ticks)]
+        return hz, position_loop(plant, gains, hz)[0]
+
+
+def dead_time_s(bench: Bench) -> float:
+    """Sum of the dead times and time constants between torque command and torque [s]."""
+    found = 0.0
+    for active in bench.twin().active:
+        mechanism = BY_ID[active.effect]
+        if active.form.stage in (Stage.CURRENT, Stage.TORQUE) and mechanism.text.picture is Picture.DELAY:
+            pairs = zip(mechanism.parameters, active.values, strict=True)
+            found += sum(value for one, value in pairs if one.dimension is Dimension.TIME)
+    return found
+
+
+def is_stable(loop: ComplexArray) -> bool:
+    """True for an open loop (k,) from low frequencies to half its rate that is stable when closed.
+
+    Nyquist's criterion for a loop without poles outside the unit circle, with at most two integrators: 1 + L ends real
+    and positive, and its angle there has turned by less than a turn from the integrators' -90 or -180 degrees.
+    """
+    distance = 1.0 + loop
+    angle = np.unwrap(np.angle(distance[::-1]))
+    return bool(distance[-1].real > 0.0 and -1.5 * pi < angle[-1] < 0.5 * pi)
+
+
+def margins_of(bench: Bench, draws: Sequence[Bench], gains: Gains, notch: Notch | None = None) -> LoopMargins:
+    """Margins of the loops of a bench with gains, and the least of the `draws` of it."""
+    return _margins([_Axis(one, gains) for one in (bench, *draws)], gains, notch)
+
+
+def tune(bench: Bench, draws: Sequence[Bench]) -> list[LoopMargins]:
+    """Margins with the gains as they are, with those proposed, and with a notch beside them where the law gains by it.
+
+    Only the first where no gain keeps the margins. Raises FieldError without a control law.
+    """
+    gains = bench.known_control.gains(bench.axis.ratio_m_rad)
+    axes = [_Axis(one, gains) for one in (bench, *draws)]
+    found = [_margins(axes, gains, None)]
+    notches = [None, *(Notch(float(hz), min(float(ratio), _WIDE)) for hz, ratio in axes[0].modes)]
+    best, *others = [(_velocity_gains(axes, gains, notch), notch) for notch in notches]
+    if best[0] is None:
+        return found
+    options, top = [best], max(others, key=lambda pair: _worth(pair[0]), default=best)
+    if _worth(top[0]) > WORTH * _worth(best[0]):
+        options.append(top)
+    for velocity, notch in options:
+        if velocity is not None:
+            found.append(_margins(axes, _rounded(_with_position_gain(axes, velocity, notch)), notch))
+    return found
+
+
+def _worth(gains: Gains | None) -> float:
+    return 0.0 if gains is None else gains.integral_gain_n_m_rad or gains.velocity_gain_n_m_s_rad
+
+
+def _velocity_gains(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> Gains | None:
+    """The gains with the velocity law of most worth that is stable and not too sensitive on each axis."""
+    has_integral = gains.integral_gain_n_m_rad > 0.0
+    tried = list[Gains]()
+    for time in _TIMES if has_integral else (1.0,):
+        unit = gains._replace(integral_gain_n_m_rad=gains.integral_gain_n_m_rad / time)
+        loop = axes[0].velocity_loop(unit, notch)
+        for factor in _FACTORS:
+            if np.min(np.abs(1.0 + factor * loop)) * MOST_SENSITIVE >= 1.0:
+                tried.append(
+                    unit._replace(
+                        velocity_gain_n_m_s_rad=factor * unit.velocity_gain_n_m_s_rad,
+                        integral_gain_n_m_rad=factor * unit.integral_gain_n_m_rad,
+                    )
+                )
+    for one in sorted(tried, key=_worth, reverse=True):
+        loops = [axis.velocity_loop(one, notch) for axis in axes]
+        if all(np.min(np.abs(1.0 + loop)) * MOST_SENSITIVE >= 1.0 and is_stable(loop) for loop in loops):
+            return one
+    return None
+
+
+def _with_position_gain(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> Gains:
+    """The gains with the largest position gain whose closed loop has no peak on any axis; unchanged if none has."""
+    loops = [axis.position_loop(gains, notch)[1] for axis in axes]
+    for factor in _FACTORS[::-1]:
+        tried = [factor * loop for loop in loops]
+        if all(float(np.max(np.abs(one / (1.0 + one)))) <= PEAK and is_stable(one) for one in tried):
+            return gains._replace(position_gain_1_s=factor * gains.position_gain_1_s)
+    return gains
+
+
+def _rounded(gains: Gains) -> Gains:
+    """The gains with two digits, which are apart by less than the factors that are tried."""
+    kp, ki, kv = gains.velocity_gain_n_m_s_rad, gains.integral_gain_n_m_rad, gains.position_gain_1_s
+    kp, kv, time_s = (float(f"{value:.2g}") for value in (kp, kv, kp / ki if ki else 0.0))
+    return gains._replace(
+        velocity_gain_n_m_s_rad=kp, integral_gain_n_m_rad=kp / time_s if ki else 0.0, position_gain_1_s=kv
+    )
+
+
+def _margins(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> LoopMargins:
+    velocity, position = axes[0].velocity_loop(gains, notch), axes[0].position_loop(gains, notch)
+    modulus = [
+        [float(np.min(np.abs(1.0 + loop))) if is_stable(loop) else 0.0 for loop in loops]
+        for loops in (
+            [axis.velocity_loop(gains, notch) for axis in axes],
+            [axis.position_loop(gains, notch)[1] for axis in axes],
+        )
+    ]
+    return LoopMargins(
+        gains,
+        notch,
+        stability_margins(axes[0].hz, velocity),
+        stability_margins(*position),
+        (min(modulus[0]), min(modulus[1])),
+    )
+
+
+def rows_of(found: Sequence[LoopMargins]) -> list[tuple[str, ...]]:
+    """A row of texts for each loop of each entry: gains, crossover, margins. The first entry: the gains as they are."""
+    rows = list[tuple[str, ...]]()
+    for number, one in enumerate(found):
+        title = (
+            "as it is"
+            if number == 0
+            else "proposed"
+            if one.notch is None
+            else f"notch at {one.notch.frequency_hz:.4g} Hz"
+        )
+        kp, ki = one.gains.velocity_gain_n_m_s_rad, one.gains.integral_gain_n_m_rad
+        law = f"Kp {kp:.3g}" + (f", Ti {1e3 * kp / ki:.3g} ms" if ki else "")
+        loops = (
+            ("velocity", law, one.velocity),
+            ("position", f"Kv {one.gains.position_gain_1_s:.3g} 1/s", one.position),
+        )
+        for (loop, gains, margins), least in zip(loops, one.least, strict=True):
+            rows.append(
+                (
+                    title, loop, gains, f"{margins.crossover_hz:.3g} Hz", f"{margins.gain_db:.1f} dB",
+                    f"{margins.phase_deg:.0f} deg", f"{margins.modulus:.2f} ({least:.2f})",
+                )
+            )  # fmt: skip
+    return rows

@@ -24,8 +24,8 @@ _TIMES_S = (0.37, 12.1, 3600.0)  # a mechanism that goes by time is another one 
 _REASONS = {
     Stage.CHAIN: "a mode: it answers by frequency, which tables do not know",
     Stage.VELOCITY_FILTER: "a lag in the loop: lower it in the drive",
-    Stage.CHANNEL: "a delay of a recorded channel",
-    Stage.ANSWER: "a delay of a recorded channel",
+    Stage.CHANNEL: "time stamps of a recorded channel: no error of the axis; comparisons take it back",
+    Stage.ANSWER: "time stamps of a recorded channel: no error of the axis; comparisons take it back",
     Stage.CURRENT: "a delay or limit of the torque: nothing that is added to the torque comes earlier or goes beyond",
     Stage.TORQUE: "a delay or limit of the torque: nothing that is added to the torque comes earlier or goes beyond",
     Stage.BRISTLE: "friction before sliding has no steady torque beside Coulomb friction",

@@ -39,7 +39,7 @@ def compensate(
     from hil.compensating.compensate import DRAWS, plan_compensation, section_of, taken_by_drive
     from hil.compensating.controllers.write_controllers import controller_files, write_files
     from hil.compensating.derive import size
-    from hil.compensating.loop_tuning import rows_of, tune
+    from hil.compensating.loop_tuning import HEADERS, UNCHANGED, margin_rows, tune
     from hil.compensating.prediction import drawn_benches, predict
     from hil.control.compensation_tables import OFF, Adds
     from hil.diagnosis.result import Result
@@ -61,9 +61,8 @@ def compensate(
     compile_kernels()
     drawn = tuple(drawn_benches(diagnosed, result, DRAWS)) if result is not None else ()
     loops = tune(diagnosed, drawn)
-    header = ("gains", "loop", "law", "crossover", "gain margin", "phase margin", "modulus (worst)")
-    table(header, rows_of(loops), right=False)
-    out.print("Tables go by set-points alone, so that margins with them are those without.")
+    table(HEADERS, margin_rows(loops), right=False)
+    out.print(UNCHANGED)
     if tuned:
         if len(loops) == 1:
             raise HilError("nothing written: no gains keep the margins on this axis; leave out --tune")

@@ -32,6 +32,8 @@ from hil.twin.structure.frequency import ComplexArray, laplace, position_loop, v
 MOST_SENSITIVE = 2.0  # a phase margin of at least 29 degrees and a gain margin of 2 (Åström, Murray 2008, ch. 9)
 PEAK = 1.06  # of the closed position loop: half a decibel
 WORTH = 1.2  # gain by a notch from which it is proposed
+HEADERS = ("gains", "loop", "law", "crossover", "gain margin", "phase margin", "modulus (worst)")
+UNCHANGED = "Tables go by set-points alone, so that margins with them are those without."
 _FACTORS = np.geomspace(1.0 / 16.0, 16.0, 97)  # of the gains as they are: 6 % apart
 _TIMES = np.geomspace(1.0 / 16.0, 16.0, 33)  # of the integral time
 _NARROW, _WIDE, _AROUND = 5.0, 0.5, 101  # widths of a mode that the frequencies cover densely; damping of a notch
@@ -218,7 +220,7 @@ def _margins(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> LoopMa
     )
 
 
-def rows_of(found: Sequence[LoopMargins]) -> list[tuple[str, ...]]:
+def margin_rows(found: Sequence[LoopMargins]) -> list[tuple[str, ...]]:
     """A row of texts for each loop of each entry: gains, crossover, margins. The first entry: the gains as they are."""
     rows = list[tuple[str, ...]]()
     for number, one in enumerate(found):

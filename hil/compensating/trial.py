@@ -23,6 +23,7 @@ from hil.compensating.compensate import (
     taken_by_drive,
     with_tables,
 )
+from hil.compensating.loop_tuning import LoopMargins, margins_of
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of
 from hil.control.compensation_tables import Adds, CompensationTable
 from hil.diagnosis.result import Result
@@ -68,6 +69,7 @@ class Trial:
     left_out: tuple[tuple[str, str], ...]
     fade_in_s: float
     unit: str = "m"
+    margins: LoopMargins | None = None  # of the diagnosed axis, the same with and without tables
 
     @property
     def statement(self) -> str:
@@ -193,7 +195,8 @@ def try_compensation(
         for name in profiles
     ]
     section = _section(plain, kept) if tables else None
-    return Trial(section, kept, tuple(tried), (*made.derived.left_out, *dropped), fade_in_s, unit)
+    margins = margins_of(bench, drawn, bench.gains)
+    return Trial(section, kept, tuple(tried), (*made.derived.left_out, *dropped), fade_in_s, unit, margins)
 
 
 def _that_can_be_judged(given: Bench, made: Plan) -> tuple[Plan, list[tuple[str, str]]]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hil.compensating.loop_tuning import HEADERS as MARGINS
+from hil.compensating.loop_tuning import UNCHANGED, margin_rows
 from hil.compensating.trial import Trial, error_series, rms
 from hil.control.compensation_tables import Adds
 from hil.figures.panels import COMMAND, MEASURED
@@ -90,6 +92,10 @@ def _page(trial: Trial, bench: Bench, folder: Path) -> None:
             ],
             left=(0, 1),
         )
+    if trial.margins:
+        page.heading("Stability")
+        page.table(MARGINS, margin_rows([trial.margins]), left=(0, 1, 2))
+        page.items([UNCHANGED])
     if trial.left_out:
         page.heading("Left out")
         page.items([f"{name}: {reason}" for name, reason in trial.left_out])

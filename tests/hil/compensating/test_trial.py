@@ -55,6 +55,7 @@ def test_what_was_found_helps_as_predicted_and_is_kept(tmp_path: Path) -> None:
     assert told["motions"][0]["following_m"]["after"] == motion.after.following_m
     page = (tmp_path / "compensation.html").read_text(encoding="utf-8")
     assert "before / after" in page
+    assert "phase margin" in page
     assert trial.statement in page
 
 

@@ -15,6 +15,10 @@ def _all(level: float) -> float:
     return 1.0
 
 
+def _never(value: float) -> bool:
+    return False
+
+
 def _none(line_hz: float) -> float:
     return 0.0
 
@@ -37,6 +41,7 @@ class AxisFacts:
     # share of the rows in which the axis moves whose |torque command| is above a level
     driven: Callable[[float], float] = _all
     swings: Callable[[float], float] = _none  # share of the motion's energy in a line [Hz]
+    grows_with_speed: Callable[[float], bool] = _never  # a line [Hz] of the torque that the motion needs
 
     @property
     def friction(self) -> float:

@@ -40,6 +40,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
         driven=lambda level: _driven(runs, level),
         swings=lambda line_hz: _swings(runs, line_hz),
+        grows_with_speed=lambda line_hz: any(_grows_with_speed(run, line_hz) for run in runs),
     )
 
 
@@ -47,6 +48,22 @@ def _swings(runs: Sequence[Measured], line_hz: float) -> float:
     """Largest share of the energy of a motion that a line [Hz] holds."""
     turns = 2.0 * math.pi * line_hz
     return max((harmonic_share(turns * run.time_s, run.velocity_command_m_s) for run in runs), default=0.0)
+
+
+def _grows_with_speed(run: Measured, line_hz: float) -> bool:
+    """True if a line [Hz] of the torque that a motion needs is there with the speed more than without it.
+
+    By least squares without a twin; a uniform speed does not tell the two apart, and counts as no growth.
+    """
+    moved, turns = motion(run.motor, run.period_s), 2.0 * math.pi * line_hz * run.time_s
+    wave = {"sine": np.sin(turns), "cosine": np.cos(turns)}
+    speed = np.abs(moved.velocity) / (float(np.sqrt(np.mean(moved.velocity**2))) or 1.0)
+    columns = {"inertia": moved.acceleration, "viscous": moved.velocity, "coulomb": moved.direction}
+    columns |= wave | {f"fast {name}": speed * one for name, one in wave.items()} | {"one": np.ones_like(speed)}
+    fit = least_squares(columns, run.torque, rows_per_sample=rows_per_sample(run.period_s))
+    of_all, fast = (math.hypot(*(fit[f"{kind}{name}"].value for name in wave)) for kind in ("", "fast "))
+    error = math.hypot(*(fit[f"fast {name}"].std_error for name in wave))
+    return fast > max(of_all, CRITERIA.sigmas * error)
 
 
 @lru_cache(maxsize=64)

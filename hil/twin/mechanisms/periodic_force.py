@@ -26,11 +26,15 @@ def _shake(value: float, at: Moment, parameters: Row, memory: Row) -> float:
 
 
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the recording holds enough waves, and that the motion is not itself of this line.
+    """Check that the recording holds enough waves, that the motion is not itself of this line, and that the line is
+    there at any speed.
 
-    Whatever an axis that swings lacks repeats with the swing.
+    Whatever an axis that swings lacks repeats with the swing; what grows with the speed, such as time stamps that are
+    late now and then, is no force.
     """
-    return values[1] * axis.duration_s >= _LEAST_WAVES and axis.swings(values[1]) < _OWN
+    line_hz = values[1]
+    enough = line_hz * axis.duration_s >= _LEAST_WAVES
+    return enough and axis.swings(line_hz) < _OWN and not axis.grows_with_speed(line_hz)
 
 
 MECHANISM = Mechanism(

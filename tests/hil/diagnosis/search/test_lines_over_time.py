@@ -11,8 +11,8 @@ from foreign_axis import axis, write
 from hil.bench.bench_file import load_bench
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
+from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.search.facts import axis_facts
-from hil.identification.measured import take
 from hil.recording.recording import read_recording
 from hil.twin.library import BY_ID
 
@@ -32,6 +32,7 @@ def test_time_stamps_that_are_late_now_and_then_are_no_force(tmp_path: Path, lat
     import_(write(tmp_path / "log.csv", table), None, tmp_path / "log.parquet", None, None)
     identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
     bench = load_bench(tmp_path / "axis.yaml")
-    facts = axis_facts(bench, [take(read_recording(tmp_path / "log.parquet"), bench)])
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], bench)
+    facts = axis_facts(prepared.bench, prepared.train.runs)
     assert facts.grows_with_speed(LINE_HZ) is bool(late_s)
     assert BY_ID["periodic_force"].is_valid((0.1, LINE_HZ, 0.0), 0, facts) is not bool(late_s)

@@ -35,6 +35,7 @@ def compensate(
     from datetime import date
 
     from hil.bench.bench_file import Bench, load_bench
+    from hil.bench.hardware import DriveMode
     from hil.commands.warm_up import compile_kernels
     from hil.compensating.compensate import DRAWS, plan_compensation, section_of, taken_by_drive
     from hil.compensating.controllers.write_controllers import controller_files, write_files
@@ -61,18 +62,22 @@ def compensate(
     compile_kernels()
     drawn = tuple(drawn_benches(diagnosed, result, DRAWS)) if result is not None else ()
     loops = tune(diagnosed, drawn)
-    table(HEADERS, margin_rows(loops), right=False)
+    table(HEADERS, margin_rows(loops, diagnosed.axis.drive_unit), right=False)
     out.print(UNCHANGED)
     if tuned:
-        if len(loops) == 1:
-            raise HilError("nothing written: no gains keep the margins on this axis; leave out --tune")
-        proposed = diagnosed.known_control.with_gains(loops[1].gains)
+        proposals = [one for one in loops[1:] if one.notch is None]
+        if not proposals:
+            raise HilError("nothing written: no gains keep both loops stable on this axis and its draws")
+        proposed = diagnosed.known_control.with_gains(proposals[0].gains)
         given, diagnosed = diagnosed, diagnosed.model_copy(update={"control": proposed})
         errors = [predict(one, motion, OFF, fade_in_s).following_m for one in (given, diagnosed)]
         unit = "rad" if diagnosed.axis.turns else "m"
-        out.print(
-            f"Predicted following error, rms, by the gains alone: {' -> '.join(quantity(e, unit) for e in errors)}"
-        )
+        told = " -> ".join(quantity(one, unit) for one in errors)
+        out.print(f"Predicted following error, rms, by the gains alone: {told}")
+        if not errors[1] < errors[0]:
+            raise HilError(f"refused, nothing written: the proposed gains do not follow this motion better ({told})")
+        if given.drive is not None and given.drive.mode is not DriveMode.CST:
+            out.print("The drive closes loops of its own: set their gains there too.")
     made = plan_compensation(diagnosed, motion, result, fade_in_s)
     taken, not_taken = taken_by_drive(diagnosed, made)
     if not taken.compensation.tables and not controllers:

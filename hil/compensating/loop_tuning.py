@@ -1,20 +1,19 @@
 """Gains of both loops, and a notch, for the identified axis, with the margins that they leave.
 
-    velocity loop   L(z) = N C V P D      notch, PI law, velocity from positions, sampled plant, dead time
+    velocity loop   L(z) = N C V P D      notch, PI law, velocity from positions, sampled plant, delays of the torque
     position loop   its samples see the closed velocity loop (`hil.twin.structure.frequency.position_loop`)
 
 PI law: the most integral gain Kp / Ti whose sensitivity |1 / (1 + L)| nowhere exceeds `MOST_SENSITIVE` (MIGO design: K.
 J. Åström, H. Panagopoulos, T. Hägglund, Automatica 34 (1998) 585); a P law: the most gain. Position loop: the most gain
 without a peak, so that a contour is not overshot. Both hold for the diagnosed axis and for each draw of it within its
-standard errors. A notch takes a mode out of the velocity loop; it is proposed where the law gains by it.
-
-Dead times and lags of the drive count as dead time: that is the more careful of the two.
+standard errors. A notch takes a mode out of the velocity loop; it is proposed where the law gains by it. Noise of the
+encoders and limits of the torque are not in it.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi
+from math import isnan, pi
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from hil.bench.bench_file import Bench
 from hil.control.cascade import Gains
 from hil.frequency.margins import StabilityMargins, stability_margins
 from hil.frequency.twin_curves import LOWEST_HZ, POINTS, sampled_plant
+from hil.twin.axis import Twin
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.parameter import Dimension
@@ -34,8 +34,9 @@ PEAK = 1.06  # of the closed position loop: half a decibel
 WORTH = 1.2  # gain by a notch from which it is proposed
 HEADERS = ("gains", "loop", "law", "crossover", "gain margin", "phase margin", "modulus (worst)")
 UNCHANGED = "Tables go by set-points alone, so that margins with them are those without."
-_FACTORS = np.geomspace(1.0 / 16.0, 16.0, 97)  # of the gains as they are: 6 % apart
-_TIMES = np.geomspace(1.0 / 16.0, 16.0, 33)  # of the integral time
+_CROSSOVERS = np.geomspace(1e-3, 1.0, 120)  # of the velocity loop, in radians per period: 6 % apart
+_TIMES = np.geomspace(4.0, 4000.0, 49)  # integral time in periods
+_POSITION_GAINS = np.geomspace(0.1, 2000.0, 170)  # [1/s]: 6 % apart
 _NARROW, _WIDE, _AROUND = 5.0, 0.5, 101  # widths of a mode that the frequencies cover densely; damping of a notch
 
 
@@ -71,7 +72,8 @@ class _Axis:
 
     def __init__(self, bench: Bench, gains: Gains) -> None:
         twin = bench.twin()
-        self.dead_time_s, self.period_s, self.twin = dead_time_s(bench), gains.period_s, twin
+        self.period_s, self.twin = gains.period_s, twin
+        self.filter_coefficient = twin.loop_gains.filter_coefficient
         highest = 0.499 / self.period_s
         modes = twin.modal.frequency_rad_s / (2.0 * pi)
         self.modes = [(f, z) for f, z in zip(modes, twin.modal.damping_ratio, strict=True) if LOWEST_HZ < f < highest]
@@ -82,7 +84,7 @@ class _Axis:
 
     def plant(self, z: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Held torque command to motor and table angle at z."""
-        late = np.exp(-np.log(z) * self.dead_time_s / self.period_s)
+        late = delays(self.twin, np.asarray(np.log(z) / self.period_s, dtype=np.complex128))
         motor, table = sampled_plant(self.twin, self.period_s)(z)
         return motor * late, table * late
 
@@ -93,7 +95,7 @@ class _Axis:
 
     def velocity_loop(self, gains: Gains, notch: Notch | None) -> ComplexArray:
         """Open velocity loop (k,)."""
-        law, velocity = velocity_law(gains, self.z)
+        law, velocity = velocity_law(self._filtered(gains), self.z)
         opened = law * velocity * self.motor
         return opened if notch is None else opened * notch.response(self.z, self.period_s)
 
@@ -106,17 +108,22 @@ class _Axis:
             return motor * filtered, table * filtered
 
         hz = self.hz[self.hz < 0.499 / (self.period_s * gains.position_ticks)]
-        return hz, position_loop(plant, gains, hz)[0]
+        return hz, position_loop(plant, self._filtered(gains), hz)[0]
+
+    def _filtered(self, gains: Gains) -> Gains:
+        """The gains with the velocity filter of the twin."""
+        return gains._replace(filter_coefficient=self.filter_coefficient)
 
 
-def dead_time_s(bench: Bench) -> float:
-    """Sum of the dead times and time constants between torque command and torque [s]."""
-    found = 0.0
-    for active in bench.twin().active:
+def delays(twin: Twin, s: ComplexArray) -> ComplexArray:
+    """Torque over its command (k,) at s: e^-st of dead times, 1 / (1 + st) of lags."""
+    found = np.ones_like(s)
+    for active in twin.active:
         mechanism = BY_ID[active.effect]
         if active.form.stage in (Stage.CURRENT, Stage.TORQUE) and mechanism.text.picture is Picture.DELAY:
-            pairs = zip(mechanism.parameters, active.values, strict=True)
-            found += sum(value for one, value in pairs if one.dimension is Dimension.TIME)
+            for one, time_s in zip(mechanism.parameters, active.values, strict=True):
+                if one.dimension is Dimension.TIME:
+                    found = found * (np.exp(-s * time_s) if mechanism.search.shifts_time else 1.0 / (1.0 + s * time_s))
     return found
 
 
@@ -152,8 +159,9 @@ def tune(bench: Bench, draws: Sequence[Bench]) -> list[LoopMargins]:
     if _worth(top[0]) > WORTH * _worth(best[0]):
         options.append(top)
     for velocity, notch in options:
-        if velocity is not None:
-            found.append(_margins(axes, _rounded(_with_position_gain(axes, velocity, notch)), notch))
+        tuned = None if velocity is None else _with_position_gain(axes, _rounded(velocity), notch)
+        if tuned is not None and min((one := _margins(axes, tuned, notch)).least) > 0.0:
+            found.append(one)
     return found
 
 
@@ -163,19 +171,16 @@ def _worth(gains: Gains | None) -> float:
 
 def _velocity_gains(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> Gains | None:
     """The gains with the velocity law of most worth that is stable and not too sensitive on each axis."""
-    has_integral = gains.integral_gain_n_m_rad > 0.0
+    period_s, inertia = gains.period_s, float(axes[0].twin.chain.inertia_kg_m2.sum())
+    proportional = inertia / period_s * _CROSSOVERS
+    times_s = _TIMES * period_s if gains.integral_gain_n_m_rad > 0.0 else (np.inf,)
     tried = list[Gains]()
-    for time in _TIMES if has_integral else (1.0,):
-        unit = gains._replace(integral_gain_n_m_rad=gains.integral_gain_n_m_rad / time)
+    for time_s in times_s:
+        unit = gains._replace(velocity_gain_n_m_s_rad=1.0, integral_gain_n_m_rad=1.0 / time_s)
         loop = axes[0].velocity_loop(unit, notch)
-        for factor in _FACTORS:
-            if np.min(np.abs(1.0 + factor * loop)) * MOST_SENSITIVE >= 1.0:
-                tried.append(
-                    unit._replace(
-                        velocity_gain_n_m_s_rad=factor * unit.velocity_gain_n_m_s_rad,
-                        integral_gain_n_m_rad=factor * unit.integral_gain_n_m_rad,
-                    )
-                )
+        least = np.array([float(np.min(np.abs(1.0 + kp * loop))) for kp in proportional])
+        for kp in proportional[least * MOST_SENSITIVE >= 1.0].tolist():
+            tried.append(unit._replace(velocity_gain_n_m_s_rad=kp, integral_gain_n_m_rad=kp / time_s))
     for one in sorted(tried, key=_worth, reverse=True):
         loops = [axis.velocity_loop(one, notch) for axis in axes]
         if all(np.min(np.abs(1.0 + loop)) * MOST_SENSITIVE >= 1.0 and is_stable(loop) for loop in loops):
@@ -183,65 +188,61 @@ def _velocity_gains(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) ->
     return None
 
 
-def _with_position_gain(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> Gains:
-    """The gains with the largest position gain whose closed loop has no peak on any axis; unchanged if none has."""
-    loops = [axis.position_loop(gains, notch)[1] for axis in axes]
-    for factor in _FACTORS[::-1]:
-        tried = [factor * loop for loop in loops]
+def _with_position_gain(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> Gains | None:
+    """The gains with the largest position gain whose closed loop has no peak on any axis; None if none has."""
+    loops = [axis.position_loop(gains._replace(position_gain_1_s=1.0), notch)[1] for axis in axes]
+    for gain in _POSITION_GAINS[::-1].tolist():
+        tried = [gain * loop for loop in loops]
         if all(float(np.max(np.abs(one / (1.0 + one)))) <= PEAK and is_stable(one) for one in tried):
-            return gains._replace(position_gain_1_s=factor * gains.position_gain_1_s)
-    return gains
+            return gains._replace(position_gain_1_s=_two_digits(gain))
+    return None
 
 
 def _rounded(gains: Gains) -> Gains:
-    """The gains with two digits, which are apart by less than the factors that are tried."""
-    kp, ki, kv = gains.velocity_gain_n_m_s_rad, gains.integral_gain_n_m_rad, gains.position_gain_1_s
-    kp, kv, time_s = (float(f"{value:.2g}") for value in (kp, kv, kp / ki if ki else 0.0))
-    return gains._replace(
-        velocity_gain_n_m_s_rad=kp, integral_gain_n_m_rad=kp / time_s if ki else 0.0, position_gain_1_s=kv
-    )
+    """The gains with two digits, to the careful side."""
+    kp, ki = gains.velocity_gain_n_m_s_rad, gains.integral_gain_n_m_rad
+    time_s = _two_digits(kp / ki, up=True) if ki else np.inf
+    return gains._replace(velocity_gain_n_m_s_rad=_two_digits(kp), integral_gain_n_m_rad=_two_digits(kp) / time_s)
+
+
+def _two_digits(value: float, up: bool = False) -> float:
+    """The value with two digits, rounded down or up."""
+    step = 10.0 ** (np.floor(np.log10(value)) - 1.0)
+    whole = np.ceil(value / step - 1e-9) if up else np.floor(value / step + 1e-9)
+    return float(f"{whole * step:.2g}")
 
 
 def _margins(axes: Sequence[_Axis], gains: Gains, notch: Notch | None) -> LoopMargins:
-    velocity, position = axes[0].velocity_loop(gains, notch), axes[0].position_loop(gains, notch)
-    modulus = [
-        [float(np.min(np.abs(1.0 + loop))) if is_stable(loop) else 0.0 for loop in loops]
-        for loops in (
-            [axis.velocity_loop(gains, notch) for axis in axes],
-            [axis.position_loop(gains, notch)[1] for axis in axes],
-        )
-    ]
-    return LoopMargins(
-        gains,
-        notch,
-        stability_margins(axes[0].hz, velocity),
-        stability_margins(*position),
-        (min(modulus[0]), min(modulus[1])),
-    )
+    loops = [(axis.velocity_loop(gains, notch), axis.position_loop(gains, notch)) for axis in axes]
+    velocity, position = loops[0]
+    inner = min(_modulus(one) for one, _ in loops)
+    outer = min(_modulus(one) for _, (_, one) in loops) if inner else 0.0  # it stands on a stable inner loop
+    margins = stability_margins(axes[0].hz, velocity), stability_margins(*position)
+    return LoopMargins(gains, notch, *margins, (inner, outer))
 
 
-def margin_rows(found: Sequence[LoopMargins]) -> list[tuple[str, ...]]:
-    """A row of texts for each loop of each entry: gains, crossover, margins. The first entry: the gains as they are."""
-    rows = list[tuple[str, ...]]()
+def _modulus(loop: ComplexArray) -> float:
+    """Modulus margin of a loop (k,); 0 if it is unstable."""
+    return float(np.min(np.abs(1.0 + loop))) if is_stable(loop) else 0.0
+
+
+def margin_rows(found: Sequence[LoopMargins], drive_unit: str) -> list[tuple[str, ...]]:
+    """A row of texts for each loop of each entry: gains, crossover, margins. First entry: the gains as they are."""
+    rows, per = list[tuple[str, ...]](), f"{drive_unit} s/{'m' if drive_unit == 'N' else 'rad'}"
     for number, one in enumerate(found):
-        title = (
-            "as it is"
-            if number == 0
-            else "proposed"
-            if one.notch is None
-            else f"notch at {one.notch.frequency_hz:.4g} Hz"
-        )
+        title = "proposed" if one.notch is None else f"notch at {one.notch.frequency_hz:.4g} Hz"
         kp, ki = one.gains.velocity_gain_n_m_s_rad, one.gains.integral_gain_n_m_rad
-        law = f"Kp {kp:.3g}" + (f", Ti {1e3 * kp / ki:.3g} ms" if ki else "")
+        law = f"Kp {kp:.3g} {per}" + (f", Ti {1e3 * kp / ki:.3g} ms" if ki else "")
         loops = (
             ("velocity", law, one.velocity),
             ("position", f"Kv {one.gains.position_gain_1_s:.3g} 1/s", one.position),
         )
         for (loop, gains, margins), least in zip(loops, one.least, strict=True):
-            rows.append(
-                (
-                    title, loop, gains, f"{margins.crossover_hz:.3g} Hz", f"{margins.gain_db:.1f} dB",
-                    f"{margins.phase_deg:.0f} deg", f"{margins.modulus:.2f} ({least:.2f})",
-                )
-            )  # fmt: skip
+            told = ["unstable", "–", "–", "–"]
+            if least > 0.0:
+                values = (margins.crossover_hz, margins.gain_db, margins.phase_deg)
+                texts = (f"{values[0]:.3g} Hz", f"{values[1]:.1f} dB", f"{values[2]:.0f} deg")
+                told = ["–" if isnan(value) else text for value, text in zip(values, texts, strict=True)]
+                told.append(f"{margins.modulus:.2f} ({least:.2f})")
+            rows.append((title if number else "as it is", loop, gains, *told))
     return rows

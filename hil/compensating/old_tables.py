@@ -11,12 +11,14 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
+from hil.compensating.derive import SMALL, SMALLEST_M, size
 from hil.compensating.shapes import NEAR, TableReach, shapes
-from hil.control.compensation_tables import CompensationTable, Over
+from hil.control.compensation_tables import Adds, CompensationTable, Over
 from hil.recording.recording import Recording
 
 OLD = 0.5  # of what the axis asks for (rms): a table that leaves more is old
 _SHIFTS = 720  # of a turn: half a degree
+_DIP = 2.0  # degrees about an angle that fits, within which the best one is taken
 
 
 def reach_of_recording(recording: Recording, bench: Bench) -> TableReach:
@@ -31,26 +33,43 @@ def reach_of_recording(recording: Recording, bench: Bench) -> TableReach:
 def old_tables(bench: Bench, reach: TableReach) -> Iterator[str]:
     """Say which tables of a bench leave much of what its twin, as diagnosed, asks for within a reach."""
     wanted = shapes(bench.twin(), reach, bench.gains.position_from_table)
-    for table in bench.tables().tables:
+    tables = [one for one in bench.tables().tables if one.over in (Over.ANGLE, Over.POSITION)]
+    if any(one.over is Over.ANGLE for one in tables) and not any(one.over is Over.ANGLE for one in wanted.values()):
+        yield "The tables over angle and position were not checked: the motion has less than two turns of the motor."
+        return
+    for table in tables:
         asked = wanted.get(table.name)
-        if asked is None or table.over not in (Over.ANGLE, Over.POSITION):
+        if asked is None or (asked.adds, asked.over) != (table.adds, table.over):
             continue
-        curve = _joined(asked, asked)
-        left = _rms(curve - _joined(table, asked))
-        if not left > OLD * _rms(curve):
+        curve, own = _joined(asked, asked), _rms(_joined(table, asked))
+        least = SMALL[table.adds] * max(size(one) for one in wanted.values() if one.adds is table.adds)
+        least = max(least, SMALLEST_M if table.adds is Adds.POSITION else 0.0)
+        whole = _rms(curve)
+        if own <= least:
             continue
-        share = left / (_rms(curve) or left)
-        text = f"The table '{table.name}' no longer fits the axis: it leaves {share:.0%} of what it is for"
-        if table.over is Over.ANGLE:
-            moved = {
-                degrees: _rms(curve - _joined(table, asked, math.radians(degrees))) / (_rms(curve) or left)
-                for degrees in sorted(np.linspace(-180.0, 180.0, _SHIFTS, endpoint=False).tolist(), key=abs)
-            }
-            least = min(moved.values())
-            if least < OLD:  # a curve that repeats within the turn fits at several angles: the nearest
-                nearest = next(degrees for degrees, one in moved.items() if one <= least + NEAR)
-                text += f"; turned by {nearest:g} deg of the motor it would leave {moved[nearest]:.0%}"
-        yield f"{text}."
+        if whole <= max(least, NEAR * own):
+            yield f"The table '{table.name}' no longer fits the axis, which asks for nothing like it any more."
+            continue
+        left = _rms(curve - _joined(table, asked)) / whole
+        if left > OLD:
+            turned = _turned(table, asked) if table.over is Over.ANGLE else ""
+            yield f"The table '{table.name}' no longer fits the axis: it leaves {left:.0%} of what it is for{turned}."
+
+
+def _turned(table: CompensationTable, asked: CompensationTable) -> str:
+    """The nearest angle at which a table would fit, in words; empty if it fits at none."""
+    curve = _joined(asked, asked)
+    moved = {
+        degrees: _rms(curve - _joined(table, asked, math.radians(degrees))) / _rms(curve)
+        for degrees in sorted(np.linspace(-180.0, 180.0, _SHIFTS, endpoint=False).tolist(), key=abs)
+    }
+    least = min(moved.values())
+    if not least < OLD:
+        return ""
+    near = next(degrees for degrees, one in moved.items() if one <= least + NEAR)  # a wave fits at several angles
+    about = [degrees for degrees in moved if abs(degrees - near) <= _DIP]
+    nearest = min(about, key=lambda degrees: moved[degrees])
+    return f"; turned by {nearest:g} deg of the motor it would leave {moved[nearest]:.0%}"
 
 
 def _joined(table: CompensationTable, at: CompensationTable, shift: float = 0.0) -> FloatArray:

@@ -94,7 +94,7 @@ def _page(trial: Trial, bench: Bench, folder: Path) -> None:
         )
     if trial.margins:
         page.heading("Stability")
-        page.table(MARGINS, margin_rows([trial.margins]), left=(0, 1, 2))
+        page.table(MARGINS, margin_rows([trial.margins], bench.axis.drive_unit), left=(0, 1, 2))
         page.items([UNCHANGED])
     if trial.left_out:
         page.heading("Left out")

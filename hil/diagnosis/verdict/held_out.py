@@ -44,7 +44,7 @@ def with_own_noise(fit: Fit, held_out: Dataset) -> Fit:
 
     A sensor that wanders far above its white noise bends masses and friction.
     """
-    ratio = max(ratios.get(_TABLE, 0.0) for ratios in fit.noise_ratios)
+    ratio = min(ratios.get(_TABLE, 0.0) for ratios in fit.noise_ratios)  # one that wanders more mutes no other one
     if not fit.terms or ratio <= CRITERIA.floor or _TABLE not in like_noise(fit, structure_left(fit, held_out)):
         return fit
     known = fit.data.set_aside

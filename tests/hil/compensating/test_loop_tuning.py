@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from command_line import hil as command
 from compensated_benches import there_and_back
 from hypothesis import given
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 import hil
 from hil.bench.bench_file import Bench, load_bench
-from hil.compensating.loop_tuning import LoopMargins, is_stable, margins_of, tune
+from hil.compensating.loop_tuning import LoopMargins, is_stable, margin_rows, margins_of, tune
 from hil.report.compare_report import write_bench
 
 
@@ -75,7 +76,7 @@ def test_proposed_gains_keep_the_margins_on_every_draw_and_follow_better() -> No
     assert proposed.gains.integral_gain_n_m_rad > as_it_is.gains.integral_gain_n_m_rad
     alone = tune(bench, ())[1]
     assert proposed.gains.integral_gain_n_m_rad <= alone.gains.integral_gain_n_m_rad
-    assert least(proposed) > 0.48  # 0.5 before the gains are rounded
+    assert least(proposed) > 0.49  # 0.5 before the gains are rounded
     tuned = bench.model_copy(update={"control": bench.known_control.with_gains(proposed.gains)})
     motion = there_and_back(bench, 0.05, 0.1)
     before, after = (hil.simulate(one, motion, seed=1) for one in (bench, tuned))
@@ -92,6 +93,28 @@ def test_a_dead_time_costs_gain() -> None:
     assert delayed.integral_gain_n_m_rad < 0.5 * prompt.integral_gain_n_m_rad
 
 
+def test_a_lag_of_the_velocity_costs_gain() -> None:
+    slow = {"effect": "velocity_filter_lag", "parameters": {"time_constant_s": 0.005}}
+    prompt, delayed = (tune(bench_of(mechanisms), ())[1].gains for mechanisms in ((), (slow,)))
+    assert delayed.integral_gain_n_m_rad < 0.5 * prompt.integral_gain_n_m_rad
+
+
+@pytest.mark.parametrize(("position", "velocity"), [(5000.0, 1.0), (1.0, 100.0), (1.0, 1e-4)])
+def test_from_gains_that_are_unstable_or_far_off_it_comes_to_the_same(position: float, velocity: float) -> None:
+    bench = bench_of()
+    gains = bench.known_control.gains(bench.axis.ratio_m_rad)
+    wrong = gains._replace(
+        position_gain_1_s=position * gains.position_gain_1_s,
+        velocity_gain_n_m_s_rad=velocity * gains.velocity_gain_n_m_s_rad,
+        integral_gain_n_m_rad=velocity * gains.integral_gain_n_m_rad,
+    )
+    as_it_is, proposed, *_ = tune(bench.model_copy(update={"control": bench.known_control.with_gains(wrong)}), ())
+    assert least(as_it_is) < 0.5
+    assert proposed.gains == pytest.approx(tune(bench, ())[1].gains)
+    texts = [row[3] for row in margin_rows([as_it_is], "N m")]
+    assert ("unstable" in texts) == (least(as_it_is) == 0.0)
+
+
 def test_a_notch_is_proposed_where_a_mode_limits_the_velocity_loop() -> None:
     bench = load_bench("reference_7dof")
     _, proposed, notched = tune(bench, ())
@@ -100,7 +123,7 @@ def test_a_notch_is_proposed_where_a_mode_limits_the_velocity_loop() -> None:
     modes = bench.twin().modal.frequency_rad_s / (2.0 * np.pi)
     assert np.min(np.abs(modes - notched.notch.frequency_hz)) < 0.1
     assert notched.gains.integral_gain_n_m_rad > 1.2 * proposed.gains.integral_gain_n_m_rad
-    assert least(notched) > 0.48
+    assert least(notched) > 0.49
 
 
 def test_the_command_prints_margins_and_takes_the_gains_on_demand(tmp_path: Path) -> None:

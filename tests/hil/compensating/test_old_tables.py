@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,4 +37,7 @@ def test_a_table_at_another_angle_and_one_that_is_gone_are_told() -> None:
     assert "'torque over angle' no longer fits" in moved
     assert "turned by -17" in moved  # 1.8 rad of a wave, of which six are a turn
     (gone,) = told(bench_of(0.4, 1e-6, compensation=section))
-    assert "turned" not in gone
+    assert "nothing like it" in gone
+    short = replace(reach, high_m=reach.low_m + 0.5 * reach.turn_m)
+    (unchecked,) = old_tables(bench_of(0.4, compensation=section), short)
+    assert "not checked" in unchecked

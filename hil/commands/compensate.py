@@ -74,7 +74,7 @@ def compensate(
         unit = "rad" if diagnosed.axis.turns else "m"
         told = " -> ".join(quantity(one, unit) for one in errors)
         out.print(f"Predicted following error, rms, by the gains alone: {told}")
-        if not errors[1] < errors[0]:
+        if min(loops[0].least) > 0.0 and not errors[1] < errors[0]:
             raise HilError(f"refused, nothing written: the proposed gains do not follow this motion better ({told})")
         if given.drive is not None and given.drive.mode is not DriveMode.CST:
             out.print("The drive closes loops of its own: set their gains there too.")

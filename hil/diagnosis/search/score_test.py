@@ -10,6 +10,7 @@ and D are those without the latter.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import qr
@@ -106,12 +107,10 @@ def _weights(part: FloatArray) -> FloatArray:
 def screen_library(base: Fit) -> list[Candidate]:
     """Make one candidate of each mechanism that is compatible with the terms of the base, best first.
 
-    Values that are scaled to the residual must be valid for their mechanism. Where they are not scaled, the starts that
-    are valid are kept.
+    Starts whose values, scaled to the residual, are not valid for their mechanism are left out.
     """
     hypothesis, terms = base.hypothesis, base.terms
-    residuals = hypothesis.residuals(base.data)
-    known = scene(base.data.runs, base.bench, residuals.channels, base.data.observer_s)
+    known = scene(base.data.runs, base.bench, hypothesis.residuals(base.data).channels, base.data.observer_s)
     points = [
         _beside_known(start, hypothesis)
         for start in (*starts(known, hypothesis.bench, base.data.runs), *_events(base))
@@ -125,13 +124,14 @@ def screen_library(base: Fit) -> list[Candidate]:
     # a tuned start replaces the grid of its mechanism
     tuned = {effect: _tuned(base, same[0], views) for effect, same in best.items()}
     best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
+    valid = partial(claimable, bench=base.bench, runs=base.data.runs)
 
     def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
-        slot, every = free_slot(effect, terms), (same[0].term, *same[0].others, *(one.term for one in same[1:_OTHERS]))
-        begun = [replace(term, slot=slot) for term in every]
-        if not BY_ID[effect].search.proportional:
-            begun = [term for term in begun if claimable(term, base.bench, base.data.runs)]
-        if not begun or not claimable(begun[0], base.bench, base.data.runs):
+        slot, scaled = free_slot(effect, terms), BY_ID[effect].search.proportional
+        same = [one for one in same if valid(one.term) or not scaled]  # an invalid start hides no other
+        every = [term for one in same[:1] for term in (one.term, *one.others)] + [one.term for one in same[1:_OTHERS]]
+        begun = [replace(term, slot=slot) for term in every if scaled or valid(term)]
+        if not begun:
             return None
         return Candidate(begun[0], same[0].score, tuple(begun[1:]), by_channel=_most(one.by_channel for one in same))
 

@@ -56,7 +56,8 @@ def diagnose(
         with progress() as tell:
             diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)
         print_diagnosis(diagnosis.result)
-        if believed.tables().tables and believed.law_known:
+        has_setpoints = {"position_command_m", "velocity_command_m_s"} <= set(train[0].columns)
+        if believed.tables().tables and believed.law_known and has_setpoints:
             for line in old_tables(diagnosis.bench, reach_of_recording(train[0], believed)):
                 out.print(line)
         with progress() as tell:

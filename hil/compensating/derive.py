@@ -51,10 +51,14 @@ def reach_of(bench: Bench, motion: Trajectory) -> TableReach:
     low, high = float(motion.position_m.min()), float(motion.position_m.max())
     if bench.drive is not None and bench.drive.travel_m is not None:
         low, high = min(low, bench.drive.travel_m[0]), max(high, bench.drive.travel_m[1])
-    physics, ratio = bench.axis.physics(), bench.axis.ratio_m_rad
-    turn_m = 2.0 * np.pi * ratio / physics.angle_per_unit if physics.turn_known else 0.0
     speed, acceleration = (float(np.abs(one).max()) for one in (motion.velocity_m_s, motion.acceleration_m_s2))
-    return TableReach(low, high, speed, acceleration, turn_m)
+    return TableReach(low, high, speed, acceleration, turn_m(bench))
+
+
+def turn_m(bench: Bench) -> float:
+    """Way per turn of the motor [m]; 0 if it is not known."""
+    physics = bench.axis.physics()
+    return 2.0 * np.pi * bench.axis.ratio_m_rad / physics.angle_per_unit if physics.turn_known else 0.0
 
 
 def derive(bench: Bench, reach: TableReach, fade_in_s: float) -> Derived:

@@ -11,12 +11,12 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
-from hil.compensating.derive import SMALL, SMALLEST_M, size
+from hil.compensating.controllers.position_table import USELESS
+from hil.compensating.derive import SMALL, SMALLEST_M, size, turn_m
 from hil.compensating.shapes import NEAR, TableReach, shapes
 from hil.control.compensation_tables import Adds, CompensationTable, Over
 from hil.recording.recording import Recording
 
-OLD = 0.5  # of what the axis asks for (rms): a table that leaves more is old
 _SHIFTS = 720  # of a turn: half a degree
 _DIP = 2.0  # degrees about an angle that fits, within which the best one is taken
 
@@ -24,10 +24,10 @@ _DIP = 2.0  # degrees about an angle that fits, within which the best one is tak
 def reach_of_recording(recording: Recording, bench: Bench) -> TableReach:
     """Travel, speed and acceleration of the set-points of a recording."""
     position, speed = recording["position_command_m"], recording["velocity_command_m_s"]
-    physics, ratio = bench.axis.physics(), bench.axis.ratio_m_rad
-    turn_m = 2.0 * math.pi * ratio / physics.angle_per_unit if physics.turn_known else 0.0
     acceleration = float(np.abs(np.gradient(speed, bench.period_s)).max())
-    return TableReach(float(position.min()), float(position.max()), float(np.abs(speed).max()), acceleration, turn_m)
+    return TableReach(
+        float(position.min()), float(position.max()), float(np.abs(speed).max()), acceleration, turn_m(bench)
+    )
 
 
 def old_tables(bench: Bench, reach: TableReach) -> Iterator[str]:
@@ -51,7 +51,7 @@ def old_tables(bench: Bench, reach: TableReach) -> Iterator[str]:
             yield f"The table '{table.name}' no longer fits the axis, which asks for nothing like it any more."
             continue
         left = _rms(curve - _joined(table, asked)) / whole
-        if left > OLD:
+        if left > USELESS:
             turned = _turned(table, asked) if table.over is Over.ANGLE else ""
             yield f"The table '{table.name}' no longer fits the axis: it leaves {left:.0%} of what it is for{turned}."
 
@@ -64,7 +64,7 @@ def _turned(table: CompensationTable, asked: CompensationTable) -> str:
         for degrees in sorted(np.linspace(-180.0, 180.0, _SHIFTS, endpoint=False).tolist(), key=abs)
     }
     least = min(moved.values())
-    if not least < OLD:
+    if not least < USELESS:
         return ""
     near = next(degrees for degrees, one in moved.items() if one <= least + NEAR)  # a wave fits at several angles
     about = [degrees for degrees in moved if abs(degrees - near) <= _DIP]

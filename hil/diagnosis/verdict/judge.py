@@ -24,7 +24,7 @@ from hil.identification.torque_left import mismatch_left
 
 @dataclass(frozen=True)
 class Remainder:
-    """What all terms together leave: share of the energy above the floor.
+    """What all terms together leave: `left` is the share of the energy above the floor.
 
     `told` is the share without the channels whose remainder is like noise (`like_noise`), `above` the largest mean
     square of the others over their noise. `open_inputs`: inputs of the twin are open or nothing is known of the control

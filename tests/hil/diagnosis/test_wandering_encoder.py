@@ -29,7 +29,7 @@ def test_wander_beside_a_lead_error_is_noise_though_the_torque_has_a_structure(t
     angle, decay = columns["angle"], float(np.exp(-1e-3 / CORRELATION_S))
     wander_m = lfilter([np.sqrt(1.0 - decay**2) * WANDER_M], [1.0, -decay], random.standard_normal(ROWS))
     place_m = LEAD_M / (2.0 * np.pi) * angle + AMPLITUDE_M * np.sin(angle) + wander_m
-    torque = columns["torque"] + 0.05 * np.sin(angle / 5.0)  # along the travel: of which nobody asks here
+    torque = columns["torque"] + 0.05 * np.sin(angle / 5.0)  # a structure of the torque
     table = {"time_s": columns["t"], "motor_angle_rad": angle, "torque_Nm": torque}
     table["scale_mm"] = np.round(1e3 * place_m / 1e-4) * 1e-4
     import_(write(tmp_path / "log.csv", table), None, tmp_path / "log.parquet", None, None)

@@ -18,6 +18,7 @@ from hil.diagnosis.result import Result
 from hil.errors import HilError
 from hil.motion.trajectory import Trajectory
 
+PULSE_IS_SMALL = "its pulse after a reversal changes the errors of this motion by nothing that counts"
 DRAWS = 12  # of the parameters: the largest of 12 is passed by one draw in 13
 
 
@@ -68,7 +69,9 @@ def plan_compensation(bench: Bench, motion: Trajectory, result: Result | None, f
 
     tables = with_lag_of_law(bench, motion, derived.compensation, fade_in_s, limits)
     compensation = replace(derived.compensation, tables=tables, limits=limits(tables))
-    derived = replace(derived, compensation=compensation)
+    derived = replace(
+        derived, compensation=compensation, left_out=(*derived.left_out, *_without_pulse(derived, tables))
+    )
     drawn = tuple(drawn_benches(bench, result, DRAWS)) if result is not None else ()
     gain = gain_of(bench, motion, compensation, drawn, fade_in_s)
     alone = {
@@ -76,6 +79,13 @@ def plan_compensation(bench: Bench, motion: Trajectory, result: Result | None, f
         for table in compensation.tables
     }
     return Plan(derived, gain, alone, _errors(bench, drawn, derived, motion))
+
+
+def _without_pulse(derived: Derived, tables: Sequence[CompensationTable]) -> list[tuple[str, str]]:
+    """Effects of which no table is left."""
+    kept = {effect for table in tables for effect in derived.sources[table.name]}
+    lost = {effect for effects in derived.sources.values() for effect in effects} - kept
+    return [(effect, PULSE_IS_SMALL) for effect in sorted(lost)]
 
 
 def with_tables(plan: Plan, tables: Sequence[CompensationTable]) -> Plan:

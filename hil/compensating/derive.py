@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.bench.bench_file import Bench
-from hil.compensating.shapes import TableReach, shapes, thinned
+from hil.compensating.shapes import PULSE, TableReach, shapes, thinned
 from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable, Over
 from hil.motion.trajectory import Trajectory
 from hil.twin.library import BY_ID
@@ -15,6 +15,7 @@ from hil.twin.physics import Active
 from hil.twin.stepping.stages import KERNEL_STAGES
 
 SMALL = {Adds.TORQUE: 2e-3, Adds.POSITION: 0.0}  # of all torque: friction is known no better
+SMALL_PULSE = 0.05  # of all torque: less is lost in the lag of the law
 SMALLEST_M = 2e-8  # below the counts of linear encoders
 MATTERS = 0.01  # of a table: change by which a mechanism counts as its source
 ROOM = 1.2  # of the limits above the largest values of the tables
@@ -28,7 +29,6 @@ _REASONS = {
     Stage.ANSWER: "time stamps of a recorded channel: no error of the axis; comparisons take it back",
     Stage.CURRENT: "a delay or limit of the torque: nothing that is added to the torque comes earlier or goes beyond",
     Stage.TORQUE: "a delay or limit of the torque: nothing that is added to the torque comes earlier or goes beyond",
-    Stage.BRISTLE: "friction before sliding has no steady torque beside Coulomb friction",
     Stage.TABLE_READING: "the linear encoder misreads: the table is where it should be",
 }
 BY_TIME = "it goes by the time of a run, not by a set-point"
@@ -75,7 +75,7 @@ def derive(bench: Bench, reach: TableReach, fade_in_s: float) -> Derived:
     found = shapes(twin, reach, gains.position_from_table)
     kept, fine = dict[str, CompensationTable](), set[str]()
     for name, table in found.items():
-        if size(table) <= SMALL[table.adds] * _largest(found.values(), table.adds) + _least(table):
+        if size(table) <= SMALL[table.adds] * _largest(found.values(), table.adds) + _least(table, found):
             continue
         few = thinned(table)
         if few is None:
@@ -86,7 +86,7 @@ def derive(bench: Bench, reach: TableReach, fade_in_s: float) -> Derived:
     sources: dict[str, list[str]] = {name: [] for name in kept}
     for index, active in enumerate(lasting):
         without = shapes(replace(twin, active=(*lasting[:index], *lasting[index + 1 :])), reach, from_table)
-        moved = [name for name in found if _changes(found[name], without[name])]
+        moved = [name for name in found if _changes(found[name], without[name], _least(found[name], found))]
         for name in set(moved) & set(sources):
             sources[name].append(active.effect)
         if not set(moved) & set(sources):
@@ -109,13 +109,17 @@ def _largest(tables: Iterable[CompensationTable], adds: Adds) -> float:
     return max((size(table) for table in tables if table.adds is adds), default=0.0)
 
 
-def _least(table: CompensationTable) -> float:
-    return SMALLEST_M if table.adds is Adds.POSITION else 0.0
+def _least(table: CompensationTable, found: dict[str, CompensationTable]) -> float:
+    """Values of a table that are nothing, whatever its size."""
+    if table.adds is Adds.POSITION:
+        return SMALLEST_M
+    return SMALL_PULSE * _largest(found.values(), Adds.TORQUE) if table.name == PULSE else 0.0
 
 
-def _changes(table: CompensationTable, other: CompensationTable) -> bool:
+def _changes(table: CompensationTable, other: CompensationTable, least: float) -> bool:
+    """True if two tables differ by more than `MATTERS` of the first and `least`."""
     change = max(np.abs(table.forward - other.forward).max(), np.abs(table.backward - other.backward).max())
-    return bool(change > MATTERS * size(table) + _least(table))
+    return bool(change > MATTERS * size(table) + least)
 
 
 def _goes_by_time(active: Active, reach: TableReach) -> bool:

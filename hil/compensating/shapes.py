@@ -1,8 +1,10 @@
-"""What a twin asks to be added, split into tables: over velocity, motor angle, position, acceleration.
+"""What a twin asks to be added, as tables: over velocity, motor angle, position, acceleration, way since a reversal.
 
 The needed torque T(x, v) of the twin in steady motion is split into f(v), its mean over places; what repeats with the
 motor angle; and the rest over the position; the last two for each direction. So is the reading of the motor encoder
-less the place of the table. No mechanism is known here: all go by the stages of the twin.
+less the place of the table. After a slow reversal the torque comes to its steady value over a way, by friction before
+sliding and the windup of the axis: what it lacks is a pulse. No mechanism is known here: all go by the stages of the
+twin.
 """
 
 import math
@@ -13,14 +15,16 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.control.compensation_tables import Adds, CompensationTable, Over
 from hil.twin.axis import Twin
-from hil.twin.steady_motion import motor_reading, needed_torque
+from hil.twin.steady_motion import motor_reading, needed_torque, torque_after_reversal
 
 PER_TURN = 512  # places in a turn: 20 of them in a cycle of the finest cogging that a table resolves
 TURNS = 12  # at most, spread over the travel
 SPEEDS = 24  # knots of each direction, closer together at low speed: where friction changes most
 KNOTS = (2, 9, 33, 65, 129, 257, 513)  # of a table over angle or position; the fewest that are near enough
 NEAR = 0.02  # of the rms of a curve: what a table may leave of it
+PULSE = "reversal"  # name of the table over the way since a reversal
 _STRIDE = 11  # of the places over which the torque is averaged: prime to PER_TURN
+WAYS = np.geomspace(1e-6, 1e-3, 24)  # of the travel: knots of a pulse
 SLOWEST = 0.005  # of the largest velocity: the first knot of the velocity, and where torque changes its direction
 
 
@@ -60,6 +64,7 @@ def shapes(twin: Twin, reach: TableReach, from_table: bool) -> dict[str, Compens
     place = reach.places
     torque = [needed_torque(twin, place.ravel(), sign * slow).reshape(place.shape) for sign in (1.0, -1.0)]
     found += _along("torque", Adds.TORQUE, reach, [one - one.mean() for one in torque])
+    found.append(_after_reversal(twin, reach))
     if not from_table:
         dense = np.unique(np.concatenate([place.ravel(), np.linspace(reach.low_m, reach.high_m, KNOTS[-1])]))
         error = [np.interp(place, dense, motor_reading(twin, dense, sign * slow) - dense) for sign in (1.0, -1.0)]
@@ -97,6 +102,13 @@ def _over_velocity(twin: Twin, reach: TableReach) -> CompensationTable:
     places = reach.places.ravel()[::_STRIDE]
     values = np.array([needed_torque(twin, places, float(speed)).mean() for speed in at])
     return CompensationTable("friction and load", Adds.TORQUE, Over.VELOCITY, at, values, values)
+
+
+def _after_reversal(twin: Twin, reach: TableReach) -> CompensationTable:
+    """Torque that is missing on the way since a reversal in the middle of the travel; 0 at its end."""
+    way, middle = WAYS * (reach.high_m - reach.low_m), 0.5 * (reach.low_m + reach.high_m)
+    columns = [torque_after_reversal(twin, middle, sign, way) for sign in (1.0, -1.0)]
+    return CompensationTable(PULSE, Adds.TORQUE, Over.REVERSAL_WAY, way, *(column - column[-1] for column in columns))
 
 
 def _along(what: str, adds: Adds, reach: TableReach, curves: list[FloatArray]) -> list[CompensationTable]:

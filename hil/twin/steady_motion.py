@@ -1,16 +1,17 @@
-"""A twin in steady motion: torque that it needs, and position that its motor encoder reads, over place and speed."""
+"""A twin in steady motion: torque that it needs, position that its motor encoder reads, and torque after a reversal."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.twin.axis import Twin
+from hil.twin.axis import Start, Twin
 from hil.twin.mechanism import Stage
 from hil.twin.stepping.records import start_memory
 from hil.twin.stepping.static_equilibrium import STROKE
 from hil.twin.stepping.steady import at_rest, steady
 
+_SLOW = 20.0  # times that the position loop needs, in which the speed after a reversal grows e times: its lag is 1/20
 _PRESSED = 1e-9  # deflection [motor units] of a flank that carries no load: it lies on without one
 
 
@@ -32,3 +33,31 @@ def motor_reading(twin: Twin, position_m: FloatArray, velocity_m_s: float) -> Fl
     delta, pushes = np.zeros((2, seen.modal.frequency_rad_s.size)), -(on_table + direction * _PRESSED * spring) / ratio
     motor, table = at_rest(position_m / ratio, pushes, direction * STROKE, *arrays, delta, start_memory())
     return np.asarray(position_m + np.interp(position_m, table, ratio * motor - table))
+
+
+def torque_after_reversal(twin: Twin, position_m: float, direction: float, way_m: FloatArray) -> FloatArray:
+    """Torque (n,) beyond that of steady motion that the axis needs at ways (n,) since a slow reversal at a position.
+
+    The twin follows x = x0 (cosh(t / tau) - 1) in closed loop: the speed grows with the way, so that each way is passed
+    as slowly as its size asks for. direction: of the motion after the reversal, 1 or -1; `way_m` must ascend from above
+    0. The twin needs a position loop.
+    """
+    gains = twin.gains
+    least_m, tau_s = 0.1 * float(way_m[0]), _SLOW / gains.position_gain_1_s
+    ticks = round(tau_s * np.arccosh(1.0 + 1.1 * way_m[-1] / least_m) / gains.period_s)
+    phase = np.arange(-ticks, ticks) * gains.period_s / tau_s
+    command_m = position_m + direction * least_m * (np.cosh(phase) - 1.0)
+    speed_m_s = direction * least_m / tau_s * np.sinh(phase)
+    moved = twin.simulate(command_m, speed_m_s, Start(float(command_m[0]), float(speed_m_s[0])))
+    place_m = moved.table_position_m if gains.position_from_table else gains.ratio_m_rad * moved.motor_position
+    turned = int(np.argmin(direction * place_m))
+    passed_m = np.maximum.accumulate(direction * (place_m[turned:] - place_m[turned]))
+    first = np.append(True, np.diff(passed_m) > 0.0)
+    torque = np.interp(way_m, passed_m[first], moved.torque_command[turned:][first])
+    inertia = float(twin.chain.inertia_kg_m2.sum()) / gains.ratio_m_rad
+    speeds = np.sqrt((way_m / least_m + 1.0) ** 2 - 1.0) * least_m / tau_s
+    steady_torque = [
+        float(needed_torque(twin, np.array([position_m + direction * way]), direction * speed)[0])
+        for way, speed in zip(way_m, speeds, strict=True)
+    ]
+    return np.asarray(torque - steady_torque - direction * inertia * (way_m + least_m) / tau_s**2)

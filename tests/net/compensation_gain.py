@@ -46,6 +46,7 @@ EFFECTS: dict[str, tuple[Adds, dict[str, tuple[float, float]]]] = {
     "position_dependent_friction": (
         Adds.TORQUE, {"fraction": (0.2, 0.4), "period_m": (0.02, 0.04), "phase_rad": PHASE}),
     "friction_gradient": (Adds.TORQUE, {"slope_1_m": (3.0, 6.0)}),
+    "presliding_hysteresis": (Adds.TORQUE, {"stiffness_n_m_rad": (40.0, 120.0)}),
     "nonlinear_viscous_friction": (Adds.TORQUE, {"quadratic_n_m_s2_rad2": (5e-5, 1e-4)}),
     "constant_load": (Adds.TORQUE, {"load_torque_n_m": (0.5, 1.5)}),
     "spring_load": (Adds.TORQUE, {"stiffness_n_m": (2e3, 6e3), "rest_position_m": (0.0, 0.05)}),

@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from real_recordings import RECORDINGS
+from real_recordings import RECORDINGS, imported
 
 from hil.drafting.plant_values import PlantValues, plant_values
 from hil.errors import InputError
@@ -60,7 +60,7 @@ def read(path: Path) -> Recording:
     """The longest part of a foreign file, imported as `hil import` does."""
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run.parquet"
-        command = [sys.executable, "-m", "hil.cli", "import", str(path), "--out", str(run)]
+        command = [sys.executable, "-m", "hil.cli", *imported(path, str(run))]
         subprocess.run(command, capture_output=True, check=True)
         return max(with_position(read_recording(run)).parts(), key=len)
 

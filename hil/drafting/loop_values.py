@@ -202,13 +202,13 @@ def _best(rows: LawRows, given: Gains) -> LawFit | None:
             fit = fit_settings([rows], base, twin, delays=free, start=base, most=_FIRST_STEPS)
             tried.append((start, free, fit))
 
-    for ticks, mean in product(_TICKS, (True, False)):
+    for ticks in _TICKS:
         if ticks * period_s > _LONGEST_S:
             continue
-        gains = given._replace(position_ticks=ticks, two_sample_mean=mean)
+        gains = given._replace(position_ticks=ticks)
         delays = find_delays(rows, Settings(gains._replace(integral_gain_n_m_rad=1.0)))
-        for integral in (1.0, 0.0):
-            start = Settings(gains._replace(integral_gain_n_m_rad=integral))
+        for mean, integral in product((True, False), (1.0, 0.0)):  # a mean is old by half a row: the fit resolves it
+            start = Settings(gains._replace(two_sample_mean=mean, integral_gain_n_m_rad=integral))
             attempt(start, 0)
             attempt(start._replace(setpoint_rows=delays[0], feedback_rows=delays[1]), 2)
     # a coarse search finds no delays of a part of a row: the fit resolves them, from none

@@ -180,8 +180,8 @@ def fit_settings(
 
     `delays`: 1 of the set-points, 2 and of the feedback.
 
-    Every tick of the position loop is tried as the first one if gains or delays are free. Delays are looked for
-    unless they `start` somewhere. `most`: evaluations.
+    If gains or delays are free, the first tick of the position loop is that with which a closed form leaves least.
+    Delays are looked for unless they `start` somewhere. `most`: evaluations.
     """
     law = _Law(base, tuple(terms), free, delays, all(run.speed_set_point.size > 0 for run in rows))
     if delays:
@@ -191,9 +191,7 @@ def fit_settings(
         return _fitted(law, twin, rows, [first_tick(run, start) for run in rows], most, start)
     if not free or base.gains.position_ticks == 1:
         return _fitted(law, twin, rows, [0] * len(rows), most)
-    cuts = range(base.gains.position_ticks)
-    first_ticks = [min(cuts, key=lambda cut, run=run: _fitted(law, twin, [run], [cut], most).cost) for run in rows]  # type: ignore[misc]
-    return _fitted(law, twin, rows, first_ticks, most)
+    return _fitted(law, twin, rows, [first_tick(run, base) for run in rows], most)
 
 
 def _scale(rows: Sequence[LawRows], gains: Gains) -> float:

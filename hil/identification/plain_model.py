@@ -17,6 +17,7 @@ count what it changes: values of a law that bends depend on the speeds.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,7 @@ from hil.identification.parallel import one_blas_thread
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 _SLIDING = 0.02  # of the top speed: below, an axis may stick, and its motion does not tell its friction
+_OTHER_WAY = 2.0  # independent samples that tell the friction of slow motion the other way
 _FEWEST = len(MOTION) + 2  # independent samples: two more than coefficients
 _NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes the inertia too small by this share
 _LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
@@ -61,6 +63,13 @@ def plain_columns(moved: MeasuredMotion, load_ratio: float | None = None, spring
     return columns
 
 
+class SlowestSliding(NamedTuple):
+    """Least speeds of rows that count as sliding, away from home and back [motor units/s]."""
+
+    away: float
+    back: float
+
+
 @dataclass(frozen=True, eq=False)
 class MotionData:
     """Motion of a recording, its torque (n,) smoothed alike, the rows (n,) that are evaluated, and the window in rows.
@@ -75,13 +84,13 @@ class MotionData:
     window: int
     noise: float = 0.0
 
-    def sliding(self, slowest: float) -> NDArray[np.bool_]:
+    def sliding(self, slowest: SlowestSliding) -> NDArray[np.bool_]:
         """Evaluated rows (n,) about which the axis moves one way, faster than `slowest`, throughout the window.
 
         A row more on both sides is what a logger's row may hold: a mean until the next one, or the value before.
         """
         low, high = (extreme(self.moved.velocity, self.window + 2) for extreme in (minimum_filter1d, maximum_filter1d))
-        return np.asarray(self.rows & ((low > slowest) | (high < -slowest)))
+        return np.asarray(self.rows & ((low > slowest.away) | (high < -slowest.back)))
 
 
 def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judged: slice = slice(None)) -> MotionData:
@@ -130,13 +139,13 @@ def _noise(position: FloatArray) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class PlainModel:
-    """Fit of the plain model, the least speed of the rows that were fitted, and the ratio of a load that turns.
+    """Fit of the plain model, the least speeds of the rows that were fitted, and the ratio of a load that turns.
 
     `late_rows`: rows by which the torque of a row is later than its position; a mean until the next row has 0.5.
     """
 
     fit: LinearFit
-    slowest: float
+    slowest: SlowestSliding
     load_ratio: float | None = None
     late_rows: float = 0.0
 
@@ -158,7 +167,7 @@ def fit_plain_model(
     row, are fitted where the rows earn them.
     """
     top = max((float(np.max(np.abs(one.moved.velocity[one.rows]), initial=0.0)) for one in data), default=0.0)
-    slowest = _SLIDING * top
+    slowest = _slowest(data, top)
     sliding = [one.sliding(slowest) for one in data]
     gains = [noise_gains(one.period_s, one.window) for one in data]
     samples = sum(gain[0] ** 2 * rows.sum() for gain, rows in zip(gains, sliding, strict=True))
@@ -227,6 +236,27 @@ def fit_plain_model(
 
     fit = final([name for name in again.names if name not in _LAW])
     return PlainModel(fit, slowest, load_ratio, late_rows)
+
+
+def _slowest(data: Sequence[MotionData], top: float) -> SlowestSliding:
+    """A share of the top speed `top` of both ways; of its own top where an axis only creeps back, above its noise.
+
+    Motion one way would not tell Coulomb friction from a load.
+    """
+    both = SlowestSliding(_SLIDING * top, _SLIDING * top)
+    sliding = np.concatenate([one.moved.velocity[one.sliding(both)] for one in data])
+    if not sliding.size or (sliding.min() < 0.0 < sliding.max()):
+        return both
+    way = float(np.sign(sliding[0]))
+    noise = max(SIGMAS * one.noise * noise_gains(one.period_s, one.window)[1] for one in data)
+    least = max(_SLIDING * max(float(np.max(-way * one.moved.velocity[one.rows], initial=0.0)) for one in data), noise)
+    other = both._replace(**{"back" if way > 0.0 else "away": least})
+    samples = sum(
+        float(noise_gains(one.period_s, one.window)[0]) ** 2
+        * float(np.sum(way * one.moved.velocity[one.sliding(other)] < 0.0))
+        for one in data
+    )
+    return other if samples >= _OTHER_WAY else both
 
 
 def _later(moved: MeasuredMotion, rows: float) -> MeasuredMotion:

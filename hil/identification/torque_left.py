@@ -31,7 +31,7 @@ from hil.identification.derivatives import matched
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
-from hil.identification.plain_model import MotionData, PlainModel, fit_plain_model, motion_data
+from hil.identification.plain_model import MotionData, PlainModel, SlowestSliding, fit_plain_model, motion_data
 from hil.identification.structure import ResidualSeries
 from hil.identification.twin_deviation import held_on_motor
 
@@ -48,7 +48,7 @@ def fit_plain(data: Dataset) -> PlainModel | None:
     return fit_plain_model([measured_motion(run) for run in data.runs], axis.ratio_m_rad if axis.turns else None)
 
 
-def torque_deviation(every: Sequence[Dataset], slowest: float) -> float:
+def torque_deviation(every: Sequence[Dataset], slowest: SlowestSliding) -> float:
     """Standard deviation of the torque of data sets where the motor is faster than `slowest`; 0 where nothing is."""
     found = [measured_motion(run) for data in every for run in data.runs]
     torque = np.concatenate([one.torque[one.sliding(slowest)] for one in found])
@@ -158,7 +158,9 @@ def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, more: 
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 
-def _share(missing: Sequence[FloatArray], data: Dataset, slowest: float, deviation: float | None) -> float | None:
+def _share(
+    missing: Sequence[FloatArray], data: Dataset, slowest: SlowestSliding, deviation: float | None
+) -> float | None:
     left = np.concatenate([*missing, np.zeros(0)])
     if not np.isfinite(left).all():  # the twin does not hold the motion
         return None

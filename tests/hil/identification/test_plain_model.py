@@ -160,7 +160,7 @@ def test_rows_that_are_not_judged_count_for_nothing() -> None:
     assert model is not None
     assert model["coulomb"].value == pytest.approx(VALUES["coulomb"], rel=0.02)
     assert not data.rows[:2100].any()
-    assert not data.sliding(model.slowest)[np.abs(data.moved.velocity) <= model.slowest].any()
+    assert not data.sliding(model.slowest)[np.abs(data.moved.velocity) <= min(model.slowest)].any()
 
 
 @pytest.mark.parametrize("position", [np.zeros(4000), TURN[:30]])
@@ -246,3 +246,31 @@ def test_the_structure_is_earned() -> None:
         noise = lfilter([0.3], [1.0, -0.95], noise) if number % 2 else noise
         kept.append(fitted(position, clean + 0.2 * noise, 0.1, 0.05).fit.names)
     assert kept.count(MOTION) >= 39
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_an_axis_that_only_creeps_back_tells_friction_from_load(way: float) -> None:
+    # 3 s there, rest, 2.5 s back at 1 % of the speed; torque and position with white noise
+    speed = np.concatenate(
+        [
+            np.zeros(500),
+            2.0 * np.sin(np.pi * TIME[:3000] / 3.0) ** 2,
+            np.zeros(500),
+            np.full(2500, -0.02),
+            np.zeros(500),
+        ]
+    )
+    position = way * np.cumsum(speed) * PERIOD_S
+    rng = np.random.default_rng(3)
+    torque = torque_of(position) + 0.02 * rng.standard_normal(position.size)
+    model = fitted(position + 1e-6 * rng.standard_normal(position.size), torque)
+    for name in ("coulomb", "offset"):
+        assert model[name].value == pytest.approx(VALUES[name], abs=4.0 * model[name].std_error)
+        assert model[name].std_error < 0.05
+
+
+def test_noise_about_rest_is_no_way_back() -> None:
+    speed = np.concatenate([np.zeros(1000), 2.0 * np.sin(np.pi * TIME[:3000] / 3.0) ** 2, np.zeros(3000)])
+    position = np.cumsum(speed) * PERIOD_S + 1e-5 * np.random.default_rng(4).standard_normal(speed.size)
+    model = fitted(position, torque_of(np.cumsum(speed) * PERIOD_S))
+    assert not np.isfinite(model["coulomb"].std_error)

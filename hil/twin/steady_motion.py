@@ -11,7 +11,8 @@ from hil.twin.stepping.records import start_memory
 from hil.twin.stepping.static_equilibrium import STROKE
 from hil.twin.stepping.steady import at_rest, steady
 
-_SLOW = 20.0  # times that the position loop needs, in which the speed after a reversal grows e times: its lag is 1/20
+# Time in which the speed after a reversal grows e times: so many of the position loop, whose lag is then 1/20; and s.
+_SLOW, _LONGEST_S = 20.0, 1.0
 _PRESSED = 1e-9  # deflection [motor units] of a flank that carries no load: it lies on without one
 
 
@@ -40,10 +41,12 @@ def torque_after_reversal(twin: Twin, position_m: float, direction: float, way_m
 
     The twin follows x = x0 (cosh(t / tau) - 1) in closed loop: the speed grows with the way, so that each way is passed
     as slowly as its size asks for. direction: of the motion after the reversal, 1 or -1; `way_m` must ascend from above
-    0. The twin needs a position loop.
+    0. Zero where no position loop is known, or where it swings.
     """
     gains = twin.gains
-    least_m, tau_s = 0.1 * float(way_m[0]), _SLOW / gains.position_gain_1_s
+    if not gains.position_gain_1_s > 0.0:
+        return np.zeros(way_m.size)
+    least_m, tau_s = 0.1 * float(way_m[0]), min(_SLOW / gains.position_gain_1_s, _LONGEST_S)
     ticks = round(tau_s * np.arccosh(1.0 + 1.1 * way_m[-1] / least_m) / gains.period_s)
     phase = np.arange(-ticks, ticks) * gains.period_s / tau_s
     command_m = position_m + direction * least_m * (np.cosh(phase) - 1.0)
@@ -51,7 +54,10 @@ def torque_after_reversal(twin: Twin, position_m: float, direction: float, way_m
     moved = twin.simulate(command_m, speed_m_s, Start(float(command_m[0]), float(speed_m_s[0])))
     place_m = moved.table_position_m if gains.position_from_table else gains.ratio_m_rad * moved.motor_position
     turned = int(np.argmin(direction * place_m))
-    passed_m = np.maximum.accumulate(direction * (place_m[turned:] - place_m[turned]))
+    since_m = direction * (place_m[turned:] - place_m[turned])
+    passed_m = np.maximum.accumulate(since_m)
+    if not (np.max(passed_m - since_m) < way_m[0] and passed_m[-1] > 0.5 * way_m[-1]):  # it swings
+        return np.zeros(way_m.size)
     first = np.append(True, np.diff(passed_m) > 0.0)
     torque = np.interp(way_m, passed_m[first], moved.torque_command[turned:][first])
     inertia = float(twin.chain.inertia_kg_m2.sum()) / gains.ratio_m_rad

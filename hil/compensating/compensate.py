@@ -9,10 +9,10 @@ import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.bench.hardware import DriveMode
-from hil.compensating.derive import Derived, derive, limits_of, reach_of
+from hil.compensating.derive import Derived, derive, limits_of, reach_of, size
 from hil.compensating.law_lag import with_lag_of_law
 from hil.compensating.prediction import Errors, Gain, drawn_benches, gain_of, predict
-from hil.compensating.shapes import shapes
+from hil.compensating.shapes import PULSE, shapes
 from hil.control.compensation_tables import Adds, Compensation, CompensationLimits, CompensationTable
 from hil.diagnosis.result import Result
 from hil.errors import HilError
@@ -109,11 +109,14 @@ def _errors(bench: Bench, drawn: tuple[Bench, ...], derived: Derived, motion: Tr
     reach, from_table = reach_of(bench, motion), bench.gains.position_from_table
     found = [shapes(one.twin(), reach, from_table) for one in drawn]
 
-    def error(name: str) -> float:
-        columns = np.array([(one[name].forward, one[name].backward) for one in found])
-        return float(np.std(columns, axis=0, ddof=1).max())
+    whole = size(shapes(bench.twin(), reach, from_table)[PULSE])
 
-    return {table.name: error(table.name) for table in derived.compensation.tables}
+    def error(table: CompensationTable) -> float:
+        columns = np.array([(one[table.name].forward, one[table.name].backward) for one in found])
+        share = size(table) / whole if table.name == PULSE else 1.0
+        return float(share * np.std(columns, axis=0, ddof=1).max())
+
+    return {table.name: error(table) for table in derived.compensation.tables}
 
 
 def section_of(plan: Plan, source: Path, date: str) -> dict[str, Any]:

@@ -29,7 +29,7 @@ _REASONS = {
     Stage.ANSWER: "time stamps of a recorded channel: no error of the axis; comparisons take it back",
     Stage.CURRENT: "a delay or limit of the torque: nothing that is added to the torque comes earlier or goes beyond",
     Stage.TORQUE: "a delay or limit of the torque: nothing that is added to the torque comes earlier or goes beyond",
-    Stage.BRISTLE: "friction before sliding is over within a way that no table follows",
+    Stage.BRISTLE: "friction before sliding: its pulse after a reversal is small, or no table follows it",
     Stage.TABLE_READING: "the linear encoder misreads: the table is where it should be",
 }
 BY_TIME = "it goes by the time of a run, not by a set-point"

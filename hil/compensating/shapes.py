@@ -22,9 +22,10 @@ TURNS = 12  # at most, spread over the travel
 SPEEDS = 24  # knots of each direction, closer together at low speed: where friction changes most
 KNOTS = (2, 9, 33, 65, 129, 257, 513)  # of a table over angle or position; the fewest that are near enough
 NEAR = 0.02  # of the rms of a curve: what a table may leave of it
+UNFINISHED = 0.1  # of a pulse, at its last knot: more is no pulse
 PULSE = "reversal"  # name of the table over the way since a reversal
 _STRIDE = 11  # of the places over which the torque is averaged: prime to PER_TURN
-WAYS = np.geomspace(1e-6, 1e-3, 24)  # of the travel: knots of a pulse
+WAYS_M = np.geomspace(1e-7, 5e-4, 28)  # knots of a pulse: of contacts, whatever the travel; rad where the load turns
 SLOWEST = 0.005  # of the largest velocity: the first knot of the velocity, and where torque changes its direction
 
 
@@ -105,10 +106,13 @@ def _over_velocity(twin: Twin, reach: TableReach) -> CompensationTable:
 
 
 def _after_reversal(twin: Twin, reach: TableReach) -> CompensationTable:
-    """Torque that is missing on the way since a reversal in the middle of the travel; 0 at its end."""
-    way, middle = WAYS * (reach.high_m - reach.low_m), 0.5 * (reach.low_m + reach.high_m)
-    columns = [torque_after_reversal(twin, middle, sign, way) for sign in (1.0, -1.0)]
-    return CompensationTable(PULSE, Adds.TORQUE, Over.REVERSAL_WAY, way, *(column - column[-1] for column in columns))
+    """Torque that is missing on the way since a reversal in the middle of the travel; 0 if it does not end there."""
+    middle = 0.5 * (reach.low_m + reach.high_m)
+    columns = [torque_after_reversal(twin, middle, sign, WAYS_M) for sign in (1.0, -1.0)]
+    ends = all(abs(column[-1]) <= UNFINISHED * abs(column[0]) for column in columns)
+    return CompensationTable(
+        PULSE, Adds.TORQUE, Over.REVERSAL_WAY, WAYS_M, *((column - column[-1]) * ends for column in columns)
+    )
 
 
 def _along(what: str, adds: Adds, reach: TableReach, curves: list[FloatArray]) -> list[CompensationTable]:

@@ -30,6 +30,7 @@ class Remembered(IntEnum):
     CORRECTION = 5  # [m]
     TORQUE = 6
     DATUM = 7  # place of the set-points at which the motor reads 0 [m]
+    PULSE = 8  # share of the pulses after a reversal
 
 
 class Added(NamedTuple):
@@ -49,7 +50,7 @@ class AddedOverTime(NamedTuple):
 
 
 _DIRECTION, _REVERSED, _SINCE_S, _SINCE_M = (int(place) for place in list(Remembered)[:4])
-_WEIGHT, _CORRECTION, _TORQUE, _DATUM = (int(place) for place in list(Remembered)[4:])
+_WEIGHT, _CORRECTION, _TORQUE, _DATUM, _PULSE = (int(place) for place in list(Remembered)[4:])
 _OVER = list(Over)
 _VELOCITY, _ACCELERATION, _ANGLE = (_OVER.index(one) for one in (Over.VELOCITY, Over.ACCELERATION, Over.ANGLE))
 _POSITION, _REVERSAL_TIME = _OVER.index(Over.POSITION), _OVER.index(Over.REVERSAL_TIME)
@@ -58,7 +59,9 @@ _TURN = 2.0 * np.pi
 
 def start() -> FloatArray:
     """State before the first tick of a run."""
-    return np.zeros(len(Remembered))
+    state = np.zeros(len(Remembered))
+    state[_PULSE] = 0.5
+    return state
 
 
 @njit(_nrt=False, error_model="numpy")
@@ -91,11 +94,8 @@ def _sum(packed, state, of_torque, position, velocity, acceleration, toward):  #
     """Sum of the tables that add to the torque (1) or to the position (0)."""
     total = 0.0
     for index in range(packed.layout.shape[0]):
-        if packed.layout[index, 0] != of_torque:
-            continue
         over, first, end = packed.layout[index, 1], packed.layout[index, 2], packed.layout[index, 3]
-        pulse = over >= _REVERSAL_TIME
-        if pulse and state[_REVERSED] == 0.0:
+        if packed.layout[index, 0] != of_torque or over >= _REVERSAL_TIME:
             continue
         if over == _VELOCITY:
             x = velocity
@@ -103,22 +103,34 @@ def _sum(packed, state, of_torque, position, velocity, acceleration, toward):  #
             x = acceleration
         elif over == _POSITION:
             x = position
-        elif over == _ANGLE:
-            x = rounded((position - state[_DATUM]) * packed.constants[6])
-        elif over == _REVERSAL_TIME:
-            x = state[_SINCE_S]
         else:
-            x = state[_SINCE_M]
-        total += _line(packed.knots, first, end, over, x, state[_DIRECTION] if pulse else toward)
+            x = rounded((position - state[_DATUM]) * packed.constants[6])
+        total += _line(packed.knots, first, end, over, x, toward)
+    return total
+
+
+@njit(_nrt=False, error_model="numpy")
+def _pulses(packed, state, of_torque, since_s, since_m):  # type: ignore[no-untyped-def]
+    """Sum of the whole pulses a time and a way after a reversal."""
+    total = 0.0
+    for index in range(packed.layout.shape[0]):
+        over, first, end = packed.layout[index, 1], packed.layout[index, 2], packed.layout[index, 3]
+        if packed.layout[index, 0] == of_torque and over >= _REVERSAL_TIME:
+            x = since_s if over == _REVERSAL_TIME else since_m
+            total += _line(packed.knots, first, end, over, x, state[_DIRECTION])
     return total
 
 
 @njit(_nrt=False, error_model="numpy")
 def _turned(packed, state, velocity):  # type: ignore[no-untyped-def]
-    """Keep direction and way since the last reversal."""
+    """Keep direction and way since the last reversal, and what share of a pulse it makes."""
     period = packed.constants[7]
     direction = 1.0 if velocity > 0.0 else -1.0 if velocity < 0.0 else state[_DIRECTION]
     if direction != state[_DIRECTION]:
+        whole = abs(_pulses(packed, state, 1, 0.0, 0.0))
+        if state[_DIRECTION] != 0.0 and whole > 0.0:
+            left = abs(_pulses(packed, state, 1, state[_SINCE_S], state[_SINCE_M])) / whole
+            state[_PULSE] = max(1.0 - rounded(state[_PULSE] * left), 0.0)
         state[_REVERSED] = 0.0 if state[_DIRECTION] == 0.0 else 1.0
         state[_DIRECTION], state[_SINCE_S], state[_SINCE_M] = direction, 0.0, 0.0
     else:
@@ -131,23 +143,28 @@ def step(packed, state, position, velocity, acceleration, wanted):  # type: igno
     """Compute what this tick adds; `state` (len(Remembered),) is changed. wanted: not stopping.
 
     Where the direction of motion counts, torque goes over within `direction_m_s` about rest, and a position is held at
-    rest for the direction of the last motion: a gap stays taken up.
+    rest for the direction of the last motion: a gap stays taken up. A pulse of the torque goes over alike, and is less
+    after a stroke in which the one before has not ended, so that the friction of both strokes joins (Masing's rule).
     """
     constants = packed.constants
     period = constants[7]
     _turned(packed, state, velocity)
     state[_WEIGHT] = min(state[_WEIGHT] + period / max(constants[4], period), 1.0) if wanted else 0.0
     weight, before = state[_WEIGHT], state[_CORRECTION]
-    target = weight * _clipped(
-        _sum(packed, state, 0, position, velocity, acceleration, state[_DIRECTION]), constants[2]
-    )
+    since_s, since_m, reversed_ = state[_SINCE_S], state[_SINCE_M], state[_REVERSED]
+    total = _sum(packed, state, 0, position, velocity, acceleration, state[_DIRECTION])
+    total += rounded(reversed_ * _pulses(packed, state, 0, since_s, since_m))
+    target = weight * _clipped(total, constants[2])
     change = _clipped(target - before, rounded(constants[3] * period))
     state[_CORRECTION] = before + change
     half = 0.5 * period
     middle = position + state[_CORRECTION] + rounded(half * velocity)
     speed = velocity + rounded(half * acceleration)
     toward = _clipped(speed / constants[5], 1.0)
-    target = weight * _clipped(_sum(packed, state, 1, middle, speed, acceleration, toward), constants[0])
+    share = rounded(reversed_ * rounded(state[_PULSE] * abs(toward)))
+    total = _sum(packed, state, 1, middle, speed, acceleration, toward)
+    total += rounded(share * _pulses(packed, state, 1, since_s, since_m))
+    target = weight * _clipped(total, constants[0])
     state[_TORQUE] += _clipped(target - state[_TORQUE], rounded(constants[1] * period))
     return Added(state[_CORRECTION], change / period, state[_TORQUE])
 

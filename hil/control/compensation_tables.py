@@ -5,7 +5,8 @@
 A table is a line through its knots. Over the motor angle it is periodic in 2 pi; over velocity and acceleration the
 outer lines go on; elsewhere the outer values hold. It has one column for motion away from home and one for the way
 back. Over a velocity, a position or an angle they differ for what depends on the direction; over the way or the time
-since a reversal they are a pulse of each direction. Everything goes by set-points, nothing by a measured value.
+since a reversal they are a pulse of each direction, less after a stroke in which the one before it has not ended and
+below the speed at which the direction counts. Everything goes by set-points, nothing by a measured value.
 """
 
 import math

@@ -13,6 +13,7 @@ from hil.twin.stepping.steady import at_rest, steady
 
 # Time in which the speed after a reversal grows e times: so many of the position loop, whose lag is then 1/20; and s.
 _SLOW, _LONGEST_S = 20.0, 1.0
+_GENTLE = 0.25  # of the position gain: a loop near its limit swings, and friction does not depend on it
 _PRESSED = 1e-9  # deflection [motor units] of a flank that carries no load: it lies on without one
 
 
@@ -43,7 +44,7 @@ def torque_after_reversal(twin: Twin, position_m: float, direction: float, way_m
     as slowly as its size asks for. direction: of the motion after the reversal, 1 or -1; `way_m` must ascend from above
     0. Zero where no position loop is known, or where it swings.
     """
-    gains = twin.gains
+    gains = twin.gains._replace(position_gain_1_s=_GENTLE * twin.gains.position_gain_1_s)
     if not gains.position_gain_1_s > 0.0:
         return np.zeros(way_m.size)
     least_m, tau_s = 0.1 * float(way_m[0]), min(_SLOW / gains.position_gain_1_s, _LONGEST_S)
@@ -51,12 +52,13 @@ def torque_after_reversal(twin: Twin, position_m: float, direction: float, way_m
     phase = np.arange(-ticks, ticks) * gains.period_s / tau_s
     command_m = position_m + direction * least_m * (np.cosh(phase) - 1.0)
     speed_m_s = direction * least_m / tau_s * np.sinh(phase)
-    moved = twin.simulate(command_m, speed_m_s, Start(float(command_m[0]), float(speed_m_s[0])))
+    moved = replace(twin, gains=gains).simulate(command_m, speed_m_s, Start(float(command_m[0]), float(speed_m_s[0])))
     place_m = moved.table_position_m if gains.position_from_table else gains.ratio_m_rad * moved.motor_position
     turned = int(np.argmin(direction * place_m))
     since_m = direction * (place_m[turned:] - place_m[turned])
     passed_m = np.maximum.accumulate(since_m)
-    if not (np.max(passed_m - since_m) < way_m[0] and passed_m[-1] > 0.5 * way_m[-1]):  # it swings
+    follows = np.max(passed_m - since_m) < way_m[0] and passed_m[-1] > 0.5 * way_m[-1]
+    if not (follows and np.max(np.abs(moved.torque_command)) < gains.torque_limit_n_m):
         return np.zeros(way_m.size)
     first = np.append(True, np.diff(passed_m) > 0.0)
     torque = np.interp(way_m, passed_m[first], moved.torque_command[turned:][first])

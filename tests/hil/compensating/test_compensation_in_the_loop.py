@@ -57,8 +57,25 @@ def test_a_position_is_held_for_the_last_direction_and_a_torque_fades_about_rest
 
 def test_a_pulse_begins_at_a_reversal_and_not_at_the_first_motion() -> None:
     pulse = one_table(Adds.TORQUE, Over.REVERSAL_WAY, [0.0, 0.002], [1.0, 0.0], [-1.0, 0.0])
-    torque = [one.torque for one in added(pulse, *((0.0, speed, 0.0) for speed in (1.0, 1.0, -1.0, -1.0, -1.0, -1.0)))]
-    assert torque == pytest.approx([0.0, 0.0, -1.0, -0.5, 0.0, 0.0])
+    speeds = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0)
+    torque = [one.torque for one in added(pulse, *((0.0, speed, 0.0) for speed in speeds))]
+    assert torque == pytest.approx([0.0, 0.0, 0.0, -1.0, -0.5, 0.0, 0.0])
+
+
+def test_a_stroke_within_a_pulse_makes_the_next_one_less() -> None:
+    # Masing: half a pulse is left after 1 mm of the first stroke, which began with half of one; then half of 0.75
+    pulse = one_table(Adds.TORQUE, Over.REVERSAL_WAY, [0.0, 0.002], [1.0, 0.0], [-1.0, 0.0])
+    speeds = (1.0, 1.0, -1.0, -1.0, 1.0, 0.2)
+    torque = [one.torque for one in added(pulse, *((0.0, speed, 0.0) for speed in speeds))]
+    assert torque[:5] == pytest.approx([0.0, 0.0, -0.75, -0.375, 0.625])
+    assert 0.0 < torque[5] <= 0.625
+
+
+def test_a_pulse_goes_over_with_the_direction() -> None:
+    pulse = one_table(Adds.TORQUE, Over.REVERSAL_WAY, [0.0, 0.002], [1.0, 0.0], [-1.0, 0.0])
+    slow = 0.25 * FREE.direction_m_s
+    torque = [one.torque for one in added(pulse, (0.0, 1.0, 0.0), *((0.0, 1.0, 0.0),) * 3, (0.0, -slow, 0.0))]
+    assert torque[-1] == pytest.approx(-0.25)
 
 
 def test_it_is_bounded_in_size_and_slope_and_fades_in() -> None:

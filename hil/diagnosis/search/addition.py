@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hil.arrays import FloatArray
 from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
@@ -25,6 +26,8 @@ from hil.identification.torque_left import torque_missed
 from hil.identification.twin_deviation import in_measured_torque
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Block, Stage
+
+_KNOTS = 12  # of a form: a curve with several bends
 
 
 @dataclass(frozen=True)
@@ -140,13 +143,34 @@ def removed(without: Fit, fit: Fit, reference: Fit) -> float:
 
 
 def removed_by_channel(without: Fit, fit: Fit, reference: Fit) -> dict[str, float]:
-    """Energy that a term removes from each channel, less the share that may be due to the form of those before it."""
+    """Energy that a term removes from each channel, less the share that may be due to the form of those before it.
+
+    The error of a sensor adds to its channel what its law says, with no dynamics between: of what a further term
+    removes beside such errors, only a function of what they add, and of its rate, may be due to their form.
+    """
     parts = [one.residuals.parts for one in (without, fit, reference)]
+    direct = all(BY_ID[term.effect].block is Block.SENSOR for term in without.terms)
     found = dict[str, float]()
     for (_, channel), a, b, n in zip(parts[0], *(one.values() for one in parts), strict=True):
-        gain = float(a @ a - b @ b) - CRITERIA.form * max(float(n @ n - a @ a), 0.0)
-        found[channel] = found.get(channel, 0.0) + max(gain, 0.0)
+        gain, form = float(a @ a - b @ b), CRITERIA.form * max(float(n @ n - a @ a), 0.0)
+        if direct and form > 0.0 and gain > 0.0:
+            form = min(form, gain * share_of_form(a - b, n - a))
+        found[channel] = found.get(channel, 0.0) + max(gain - form, 0.0)
     return found
+
+
+def share_of_form(change: FloatArray, added: FloatArray) -> float:
+    """Share of a change (n,) that is a function of what other terms add (n,) plus one of its rate, by least squares."""
+    columns = np.column_stack([_hats(added), _hats(np.gradient(added))])
+    left = change - columns @ np.linalg.lstsq(columns, change, rcond=1e-9)[0]
+    varies = float(np.var(change))
+    return 1.0 - float(np.var(left)) / varies if varies > 0.0 else 1.0
+
+
+def _hats(values: FloatArray) -> FloatArray:
+    """Piecewise linear functions (n, k) of values (n,), with as many of these between each two knots."""
+    knots = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _KNOTS)))
+    return np.column_stack([np.interp(values, knots, one) for one in np.eye(knots.size)])
 
 
 def torque_of(fit: Fit, without: Fit, term: Term, data: Dataset) -> tuple[float, float] | None:

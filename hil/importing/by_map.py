@@ -15,6 +15,7 @@ from hil.files.yaml_model import load_model
 from hil.importing.channel_clocks import merge, seconds
 from hil.importing.foreign_columns import FEW_MISSING, Foreign, read_foreign
 from hil.importing.map_file import RecordingMap
+from hil.importing.motor_set_points import SET_POINTS, gear_of_set_points
 from hil.importing.rows import complete_rows
 from hil.importing.units import base_of
 from hil.importing.wraps import unwrapped
@@ -85,6 +86,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
 
     rows = regular_rows(complete.columns, place, the_map.resample_hz)
     columns = dict(rows.columns)
+    geared = _set_points_of_the_load(columns, the_map.axis, origins)
     derived = _derive(columns, the_map.axis, rows)
     metadata: dict[str, Any] = {
         "source": source.name,
@@ -97,7 +99,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
         "clock": _describe_clock(rows),
     }
     metadata |= clock_metadata(rows)
-    if notes := [*foreign.notes, *complete.notes, *rows.notes]:
+    if notes := [*foreign.notes, *complete.notes, *rows.notes, *geared]:
         metadata[CLOCK_NOTES] = notes
     return Recording(source.stem, columns, rows.period_s, metadata)
 
@@ -122,6 +124,19 @@ def _time_s(the_map: RecordingMap, raw: dict[str, FloatArray]) -> FloatArray:
     assert the_map.sample_rate_hz is not None
     rows = next(iter(raw.values())).size
     return np.asarray(np.arange(rows) / the_map.sample_rate_hz, dtype=np.float64)
+
+
+def _set_points_of_the_load(
+    columns: dict[str, FloatArray], axis: AxisChannels, origins: dict[str, dict[str, str | float]]
+) -> list[str]:
+    """Divide set-points of the motor's angle by the gear; notes of what was changed."""
+    gear = gear_of_set_points(columns, axis)
+    if gear == 1.0:
+        return []
+    for name in (name for name in SET_POINTS if name in columns):
+        columns[name] = columns[name] / gear
+        origins[name] |= {key: float(origins[name][key]) / gear for key in ("factor", STEP) if key in origins[name]}
+    return [f"set-points: they follow the motor's angle, and are divided by the gear ratio {gear:.6g} of the encoders"]
 
 
 def _derive(columns: dict[str, FloatArray], axis: AxisChannels, rows: RegularRows) -> dict[str, str]:

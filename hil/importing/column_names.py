@@ -19,6 +19,7 @@ from hil.quantities import UNITS
 _NOTHING = (Quantity.UNKNOWN, False)
 _BRACKET = re.compile(r"[\[({].*[\])}]")
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+(:\d+)?")
+_OBJECT = re.compile(r"(?<![0-9a-zA-Z])(?:0x)?(6[0-9a-fA-F]{3})h?(?![0-9a-zA-Z])")
 _INDEX = re.compile(r"[\[({]\s*(?:\w+\s*[,;:]\s*)?(\d+)\s*[\])}]\s*$")  # [2], (2), [u1, 2]
 _LINEAR_AXES, _AXES = "xyz", "xyzabcuvw"  # ISO 841
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
@@ -74,6 +75,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     quantity, letter = next((one for one in found if one != _NOTHING), _NOTHING)
     if unit is None and not odd and not letter and quantity is not Quantity.UNKNOWN:
         unit = unit_within(name, quantity)
+    if unit is None and not odd and quantity is Quantity.EFFORT:
+        unit = _unit_of_object(name)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
     if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):
@@ -101,6 +104,13 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
         _any(words, known.encoder),
     )
+
+
+def _unit_of_object(name: str) -> str | None:
+    """Unit that CiA 402 gives the object of a name: 6077 torque actual, 0x6077, 6077h."""
+    index = _OBJECT.search(name)
+    units = lexicon().objects.items()
+    return next((unit for unit, known in units if index and index[1].lower() in known), None)
 
 
 def _axis(tokens: list[str]) -> str:

@@ -89,7 +89,7 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         return entry
     if unit in ("%", "permille"):
         rated, text = _rated(told, linear, table)
-        entry.keys["rated"] = rated
+        entry.keys["rated"] = float(f"{rated:.12g}")
         if text:
             entry.notes.append(f"{column}: its constant is taken from the header of the file: {text}")
         else:

@@ -143,6 +143,7 @@ class Lexicon(_Entry):
     angular_speed: Words
     length: Words
     units: dict[str, Words]
+    objects: dict[Literal["permille"], Words]
     after_unit: Words
     constants: dict[Constant, ConstantWords]
     other_constants: Words

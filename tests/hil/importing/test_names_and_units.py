@@ -75,3 +75,19 @@ def test_counts_of_a_length_are_a_factor_and_its_unit() -> None:
     assert factor_and_unit("0.1 mm/s") == (0.1, "mm/s")
     assert unit_named("deg per s") == "deg/s"
     assert unit_named("percent") == "%"
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("6077 torque actual", "permille"),
+        ("Torque actual value 0x6077", "permille"),
+        ("6074h_torque_demand", "permille"),
+        ("6078 current actual value", "permille"),
+        ("torque 6077 [Nm]", "N m"),  # what the file says counts more than the standard
+        ("torque 16077", None),
+        ("6064 position actual", None),
+    ],
+)
+def test_objects_of_the_drive_profile_have_the_unit_of_the_standard(name: str, unit: str | None) -> None:
+    assert label(name).unit == unit

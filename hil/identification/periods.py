@@ -31,7 +31,7 @@ def strongest_periods(
     """
     span = float(np.ptp(position)) if position.size else 0.0
     width, shortest = max(width, span / _MOST_BINS), max(shortest, 4.0 * span / _MOST_BINS)
-    if position.size < _FEWEST_ROWS or span < 4.0 * shortest:
+    if position.size < _FEWEST_ROWS or span < 4.0 * shortest or longest <= shortest:
         return []
     if longest < span:
         signal = signal - _slow(position, signal, longest)

@@ -46,3 +46,9 @@ def test_a_few_rows_and_a_short_way_have_no_period(x: np.ndarray) -> None:
 def test_a_spindle_that_turns_a_million_times_its_shortest_period_needs_little_memory() -> None:
     x = np.linspace(0.0, 60_000.0, 20_000)
     assert strongest_periods(x, np.sin(2.0 * np.pi * x / 50.0), 1e-4, 1e-3, 1) == pytest.approx([50.0], rel=0.01)
+
+
+def test_no_period_lies_between_limits_that_exclude_each_other() -> None:
+    """Counts of an unknown size may travel a thousand kilometres: no bins of a hundredth of a millimetre are made."""
+    position = np.linspace(0.0, 1e6, 5000)
+    assert strongest_periods(position, np.sin(position), 1.0, 10.0, 1, longest=1e-5) == []

@@ -20,6 +20,7 @@ from hil.importing.stamp_columns import (
     fraction_of,
     growing,
     range_of,
+    since_1970,
     unit_of_stamps,
     whole_seconds,
 )
@@ -135,13 +136,13 @@ def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
 
 
 def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
-    """The first column without a known quantity that grows by nearly equal steps, or holds whole seconds since 1970.
+    """The first column without a known quantity that grows by nearly equal steps, or holds seconds since 1970.
 
     Row numbers are none.
     """
     for name, values in table.columns.items():
         steps = np.diff(counted_on(values, range_of(values)))
-        if labels[name].quantity is Quantity.UNKNOWN and whole_seconds(values):
+        if labels[name].quantity is Quantity.UNKNOWN and (whole_seconds(values) or since_1970(values)):
             return [name]
         if (
             (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter)

@@ -25,6 +25,7 @@ from hil.importing.questions import effort_unit, position_unit
 from hil.importing.roles import Roles, find_roles, may_be_asked
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
+from hil.importing.unit_choice import are_counts
 from hil.importing.wraps import unwrapped, wrap_range
 
 
@@ -162,7 +163,10 @@ def _labels(table: ForeignTable) -> dict[str, Label]:
     """Meaning of the columns by all that the file says of them."""
     units = table.units | table.cell_units
     told = {name: (units.get(name, ""), table.words.get(name, ""), name in table.cell_units) for name in table.columns}
-    return {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
+    labels = {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
+    # no axis moves hundreds of metres in whole ones: enc_m is the motor's encoder
+    metres = [name for name, one in labels.items() if one.unit == "m" and are_counts(table.columns[name])]
+    return labels | {name: replace(labels[name], unit=None) for name in metres if name not in units}
 
 
 def _scaled(table: ForeignTable, name: str) -> FloatArray:

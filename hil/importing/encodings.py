@@ -11,6 +11,7 @@ _MOST_LINES = 400  # beginning of a file, with its names and units
 _SEPARATORS = re.compile(r"[\t;,|\"]|\s{2,}|\s(?=\[)")
 # letters of western languages and signs of units; other scripts are judged by their category
 _USUAL = set("äöüÄÖÜßéèêëàâáåçñíìîïóòôúùûøæœ°º²³·µμΩω‰±×÷–—’‘“”…«»€®©½") | {"\u00a0", "\u202f", "\ufeff"}
+_BESIDE_WORDS = set("°‰±÷©®€«»“”")  # signs that stand within no word
 
 
 def encoding_of(lines: Sequence[bytes]) -> str:
@@ -31,11 +32,16 @@ def _decoded(lines: Sequence[bytes], encoding: str) -> list[str] | None:
 
 def _sense(lines: Sequence[str]) -> tuple[float, float]:
     """Share of the signs that are usual, and the number of words and units that are known."""
-    signs = [sign for line in lines for sign in line if ord(sign) > 127]
-    usual = sum(_usual(sign) for sign in signs) / max(len(signs), 1)
+    around = [(line[at - 1 : at + 2], sign) for line in lines for at, sign in enumerate(line) if ord(sign) > 127]
+    usual = sum(_usual(sign) for beside, sign in around if not _amid(beside, sign)) / max(len(around), 1)
     words = {word.strip() for line in lines for word in _SEPARATORS.split(line) if not word.isascii()}
     known = sum(one.sure or one.unit is not None for one in map(label, words))
     return round(usual, 1), known + usual
+
+
+def _amid(beside: str, sign: str) -> bool:
+    """True if a sign that stands within no word has letters on both sides: Ger‰t."""
+    return sign in _BESIDE_WORDS and len(beside) == 3 and beside[0].isalpha() and beside[2].isalpha()
 
 
 def _usual(sign: str) -> float:

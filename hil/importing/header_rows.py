@@ -168,10 +168,11 @@ def _otherwise_split(fields: list[str], delimiter: str, width: int) -> list[str]
 
 
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
-    """Fields of a line whose names hold the delimiter: "Torque, actual [Nm]"; empty where it does not fit."""
+    """Fields of a line whose names hold the delimiter: "Torque, actual [Nm]", "t / s   M %"; empty if none fits."""
     mark = re.escape(delimiter)
-    for pattern in (rf"{mark}(?!\s)", rf"(?<=[\])])\s*{mark}"):
-        fields = [one.strip(' "') for one in re.split(pattern, text)]
+    wide = r"\s{2,}" if delimiter.isspace() else rf"{mark}(?!\s)"
+    for pattern in (wide, rf"(?<=[\])])\s*{mark}"):
+        fields = [one.strip(' "') for one in re.split(pattern, text.strip())]
         if len(fields) == width:
             return fields
     return []

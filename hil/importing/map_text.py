@@ -75,6 +75,10 @@ def _value(value: object) -> str:
 
 
 def asked_lines(text: str) -> list[tuple[int, str]]:
-    """Lines (from 1) of a map's text with a key that is asked, and the key with its question."""
+    """Lines (from 1) of a map's text with a key that has no value yet, and the key with its question."""
     lines = [(number, *line.partition(ASKED)) for number, line in enumerate(text.splitlines(), 1)]
-    return [(number, f"{key.strip()} {question.strip()}") for number, key, mark, question in lines if mark]
+    return [
+        (number, f"{key.strip()} {question.strip()}")
+        for number, key, mark, question in lines
+        if mark and key.rstrip().endswith(":")
+    ]

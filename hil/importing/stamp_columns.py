@@ -108,6 +108,12 @@ def whole_seconds(stamps: FloatArray) -> bool:
     return whole and bool(np.all((stamps > _SINCE) & (stamps < _UNTIL)) and np.all(np.diff(stamps) >= 0.0))
 
 
+def since_1970(stamps: FloatArray) -> bool:
+    """True for seconds (n,) of this century since 1970 that grow from row to row, also unevenly."""
+    good = bool(np.isfinite(stamps).all() and np.all((stamps > _SINCE) & (stamps < _UNTIL)))
+    return good and bool(np.all(np.diff(stamps) > 0.0))
+
+
 def fraction_of(coarse: Stamps, name: str, values: FloatArray, told: Label) -> Stamps | None:
     """Stamps with the fraction of a second in another column (n,), which begins again with each second; else None."""
     ranges = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}

@@ -286,6 +286,7 @@ def test_characters_of_dos_are_read(tmp_path: Path) -> None:
         ("時間[ms];モータ回転角度[deg];トルク[N・m]", "cp932"),
         ("temps [s];angle [°];couple [mN·m]", "mac_roman"),
         ("Zeit [µs];Winkel [°];Drehmoment für Prüfung [Ncm]", "cp1252"),
+        ("Zeit [s];Winkel am Messgerät [°];Drehmoment am Längenmessgerät [Ncm]", "cp1252"),
     ],
 )
 def test_the_encoding_is_that_in_which_the_words_are_known(tmp_path: Path, names: str, encoding: str) -> None:

@@ -49,3 +49,9 @@ def test_a_lead_is_asked_still(tmp_path: Path) -> None:
     _, _, asked = imported(tmp_path, t="t", x_act="x_act_mm", torque="torque_Nm")
     assert len(asked) == 1
     assert asked[0].startswith("lead_m")
+
+
+def test_a_value_beside_its_question_answers_it() -> None:
+    text = "lead_m:   # <-- write: the metres per revolution\nchannels:\n    unit:   # <-- write: the unit\n"
+    assert [line for line, _ in asked_lines(text)] == [1, 3]
+    assert asked_lines(text.replace("lead_m:  ", "lead_m: 0.2  "))[0][0] == 3

@@ -1,0 +1,56 @@
+"""Stamps since 1970 without a known name, a motor's encoder called enc_m, and names of several words over blanks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import axis
+
+from hil.importing.draft_map import draft_map
+
+AXIS = axis(3000, rate_hz=250.0)
+
+
+def test_uneven_seconds_since_1970_are_the_clock_and_whole_numbers_are_no_metres(tmp_path: Path) -> None:
+    jitter = np.random.default_rng(3).uniform(-1e-3, 1e-3, AXIS["t"].size)
+    turns = AXIS["angle"] / (2.0 * np.pi)
+    counts = {"enc_m": 131072 * turns, "enc_l": 10000 + 1048576 * turns / 101.0}
+    lines = [
+        json.dumps(
+            {
+                "ts": 1.718e9 + AXIS["t"][row] + jitter[row],
+                "j1": {name: round(values[row]) for name, values in counts.items()} | {"iq": AXIS["torque"][row]},
+            }
+        )
+        for row in range(AXIS["t"].size)
+    ]
+    path = tmp_path / "joint.jsonl"
+    path.write_text("\n".join(lines) + "\n")
+    draft = draft_map(path)
+    assert draft.clock.time is not None
+    assert (draft.clock.time.column, draft.clock.time.unit) == ("ts", "s")
+    units = {str(one.entry["column"]): one.entry["unit"] for one in draft.channels}
+    assert units["j1.enc_m"] == units["j1.enc_l"] == "counts"
+
+
+def test_names_of_several_words_stand_between_wide_blanks(tmp_path: Path) -> None:
+    millimetres = 6.0 / (2.0 * np.pi) * AXIS["angle"]
+    rows = [
+        f"{time:12.4f}{place:12.3f}{round(speed):12d}{percent:10.1f}".replace(".", ",")
+        for time, place, speed, percent in zip(
+            AXIS["t"], millimetres, 60.0 * np.gradient(millimetres, 4e-3), 100.0 * AXIS["torque"], strict=True
+        )
+    ]
+    head = ["Antrieb A14 Spindelverstellung", "Nennmoment 1,00 Nm = 100 %", ""]
+    names = f"{'t / s':>12}{'Ist mm':>12}{'v mm/min':>12}{'M %':>10}"
+    path = tmp_path / "log.txt"
+    path.write_text("\n".join([*head, names, *rows]) + "\n")
+    draft = draft_map(path)
+    assert draft.clock.time is not None
+    assert draft.clock.time.column == "t / s"
+    entries = {str(one.entry["column"]): one.entry for one in draft.channels}
+    assert entries["Ist mm"]["unit"] == "mm"
+    assert entries["M %"] == pytest.approx({"column": "M %", "unit": "%", "rated": 1.0})

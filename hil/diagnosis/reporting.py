@@ -11,6 +11,7 @@ from hil.diagnosis.location.locate import locate, shown_in
 from hil.diagnosis.notes import at_bound, notes_on
 from hil.diagnosis.result import (
     AT_FLOOR,
+    NO_STRUCTURE,
     Location,
     NextExperiment,
     Result,
@@ -167,7 +168,7 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
         return Unexplained(share=share, description=AT_FLOOR)
     alike = {names[name] for name in like_noise(final, judged.structure)}
     text = ", ".join(
-        f"{spoken(name)} {digits(above[name])} times" + (" (no structure)" if name in alike else "")
+        f"{spoken(name)} {digits(above[name])} times" + (f" {NO_STRUCTURE}" if name in alike else "")
         for name in sorted(above, key=lambda n: -above[n])
     )
     if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:

@@ -139,6 +139,7 @@ class ChannelFit(ResultPart):
 AT_FLOOR = (
     "Block by block, with measured inputs, the residuals of all channels are within the noise of positions and torque."
 )
+NO_STRUCTURE = "(no structure)"  # behind a channel whose remainder depends on nothing
 
 
 class Unexplained(ResultPart):

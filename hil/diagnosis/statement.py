@@ -7,7 +7,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
 from hil.diagnosis.ledger import EXPLAINS
 from hil.diagnosis.open_questions import cannot_show
-from hil.diagnosis.result import AT_FLOOR, AxisChange, Finding, Result, TorqueLeft, Verdict
+from hil.diagnosis.result import AT_FLOOR, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import listed, named, titles
 from hil.identification.least_squares import SIGMAS
@@ -29,7 +29,7 @@ def statement(result: Result) -> str:
     if result.verdict is Verdict.NO_MISMATCH:
         told = _leaves(result.torque_left)
         noise = f"The twin reproduces these recordings to within their noise{f' and {told}' if told else ''}."
-        return " ".join(filter(None, (noise, cannot_show(result))))
+        return " ".join(filter(None, (noise, _wandering(result.unexplained.description), cannot_show(result))))
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget and not result.partial:
@@ -51,7 +51,15 @@ def explained(result: Result) -> bool:
     """True if the answer is sure and nothing above the noise, and no structure, is left."""
     sure = not result.missing or max(one.confidence for one in result.missing) >= CRITERIA.likely
     whole = result.verdict is not Verdict.UNEXPLAINED and not result.time_budget and not result.partial
-    return whole and sure and not result.structure and result.unexplained.description == AT_FLOOR
+    nothing = result.verdict is Verdict.NO_MISMATCH or result.unexplained.description == AT_FLOOR
+    return whole and sure and not result.structure and nothing
+
+
+def _wandering(left: str) -> str:
+    """What is above the white noise of a channel and depends on nothing."""
+    if NO_STRUCTURE not in left:
+        return ""
+    return f"{left.removesuffix('.')}: noise that wanders, or a random disturbance."
 
 
 def _found(before: str, found: Sequence[Finding]) -> str:

@@ -36,7 +36,7 @@ _RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that s
 class Question:
     """A quantity (n,) of each run that a residual may depend on, in a unit.
 
-    `length` is the unit of positions, m or rad. `by_direction`: it is counted from its least value on, and further by
+    `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
     `by_direction` where the axis moves up. `kept`: it means the same in other recordings. `choices`: number of
     quantities of which the residual itself chose this one.
     """
@@ -47,6 +47,7 @@ class Question:
     values: tuple[FloatArray, ...]
     bins: int = BINS
     by_direction: float = 0.0
+    least: float = 0.0
     kept: bool = True
     choices: int = 1
 
@@ -93,7 +94,7 @@ class Dependence:
             # a range may cover the end of one way and the begin of the other
             up = low + high >= 2.0 * question.by_direction
             begin, moving = (question.by_direction, " moving up") if up else (0.0, " moving down")
-            low, high = (min(max(one - begin, 0.0), question.by_direction) for one in (low, high))
+            low, high = (question.least + min(max(one - begin, 0.0), question.by_direction) for one in (low, high))
         factor, unit = reading_unit(question.unit, max(abs(low), abs(high)))
         return (
             f"{what} at a {question.name} of {digits(factor * low)} to {digits(factor * high)} {unit}{moving} "
@@ -154,12 +155,17 @@ def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[
     duration = max(float(run.time_s[-1]) for run in data.runs) - begin
     up = [moved.velocity > 0.0 for moved in motions]
     by_direction = tuple(one - low + 1.001 * span * moves for one, moves in zip(position, up, strict=True))
+    load = [plain.predict(moved) for moved in motions]
+    least = min(float(one.min()) for one in load)
+    range_ = 1.001 * (max(float(one.max()) for one in load) - least)
+    by_load = tuple(one - least + range_ * moves for one, moves in zip(load, up, strict=True))
     later = tuple(run.time_s - begin + 1.001 * duration * moves for run, moves in zip(data.runs, up, strict=True))
     return [
         Question(POSITION, length, length, position),
         Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
         Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
-        Question("load", hypothesis.bench.axis.drive_unit, length, tuple(plain.predict(moved) for moved in motions)),
+        # friction of a load has its sign
+        Question("load", hypothesis.bench.axis.drive_unit, length, by_load, 2 * BINS, range_, least),
         Question("time", "s", length, later, 2 * BINS, 1.001 * duration, kept=False),
     ]
 

@@ -1,23 +1,30 @@
 """How well a twin without new terms reproduces recordings: noise, structure, and torque beside the plain model."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, examine
 from hil.diagnosis.reproduced import REPRODUCED
 from hil.diagnosis.stages import Judged
-from hil.diagnosis.structure_left import structure_left
+from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.torque_left import fit_plain, left_by_plain, torque_deviation, torque_missed
 
+_TABLE = "table"
+
 
 @dataclass(frozen=True)
 class Reproduced:
-    """What a twin leaves. `worst` and `held_out`: largest mean square of a channel over its noise, in training and on
-    held-out recordings. `noisy`: the noise of a measured torque drives the twin. Beside them
-    the strongest structure in words, and the torque missed on held-out motion by the twin and by the plain model, over
-    its deviation (rms). None where there is nothing held out, or no torque."""
+    """What a twin leaves.
+
+    `worst` and `held_out`: largest mean square of a channel over its noise, in training and on held-out recordings,
+    without a second encoder whose remainder is like noise (`like_noise`): encoders wander. `noisy`: the noise of a
+    measured torque drives the twin. Beside them the strongest structure in words, and the torque missed on held-out
+    motion by the twin and by the plain model, over its deviation (rms). None where there is nothing held out, or no
+    torque.
+    """
 
     worst: float
     noisy: bool
@@ -28,13 +35,20 @@ class Reproduced:
 
 def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
     """Answers of the rules on a twin without new terms."""
-    elsewhere = fit.on(held_out).worst_ratio if held_out.runs else None
     structure = structure_left(fit, held_out)
+    noise = like_noise(fit, structure) & {_TABLE}
+    worst = _worst(fit, noise)
+    elsewhere = _worst(fit.on(held_out), noise) if held_out.runs else None
     words = structure[0].in_words(fit.bench.axis.drive_unit) if structure else ""
     left, plain = torque_missed(fit, held_out), _missed_by_plain(fit, held_out)
     torque = None if left is None or plain is None else (left, plain)
     noisy = not fit.data.observability.exact_input
-    return examine(REPRODUCED, Reproduced(fit.worst_ratio, noisy, elsewhere, words, torque), CRITERIA)
+    return examine(REPRODUCED, Reproduced(worst, noisy, elsewhere, words, torque), CRITERIA)
+
+
+def _worst(fit: Fit, noise: Collection[str]) -> float:
+    """Largest mean square over its noise of the channels whose remainder is more than `noise`; 1 without any."""
+    return max((one for run in fit.noise_ratios for name, one in run.items() if name not in noise), default=1.0)
 
 
 def behind_plain(judged: Judged) -> bool:

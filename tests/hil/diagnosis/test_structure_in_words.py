@@ -24,3 +24,10 @@ def test_a_range_lies_within_one_direction(low: float, high: float, said: str) -
     text = Dependence(TORQUE, question, found, 0.5, 2.0, None).in_words("N m")
     assert text.startswith("the axis needs 0.200 N m more torque than the twin")
     assert said in text
+
+
+def test_a_load_is_told_as_it_is_in_each_direction() -> None:
+    question = Question("load", "N m", "m", (), by_direction=4.0, least=-1.0)
+    found = Structure(np.array([6.0, 6.5]), np.array([0.2]), np.array([0.01]), 0.04, 1e-6)
+    text = Dependence(TORQUE, question, found, 0.5, 2.0, None).in_words("N m")
+    assert "at a load of 1.00 to 1.50 N m moving up" in text

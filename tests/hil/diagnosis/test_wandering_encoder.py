@@ -17,6 +17,7 @@ from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.verdict.held_out import with_own_noise
 from hil.diagnosis.verdict.judge import explanation
+from hil.diagnosis.verdict.reproduction import reproduction
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.recording.recording import read_recording
@@ -61,3 +62,19 @@ def test_what_goes_with_the_motion_is_no_noise(tmp_path: Path) -> None:
     prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
     base = fit_nominal_parameters(prepared.train)
     assert "table" not in like_noise(base, structure_left(base, prepared.held_out))
+    assert not accepted(reproduction(base, prepared.held_out))
+
+
+def test_a_twin_beside_an_encoder_that_wanders_alone_lacks_nothing(tmp_path: Path) -> None:
+    columns, random = axis(ROWS), np.random.default_rng(5)
+    decay = float(np.exp(-1e-3 / CORRELATION_S))
+    wander_m = lfilter([np.sqrt(1.0 - decay**2) * WANDER_M], [1.0, -decay], random.standard_normal(ROWS))
+    place_m = LEAD_M / (2.0 * np.pi) * columns["angle"] + wander_m
+    table = {"time_s": columns["t"], "motor_angle_rad": columns["angle"], "torque_Nm": columns["torque"]}
+    table["scale_mm"] = np.round(1e3 * place_m / 1e-4) * 1e-4
+    import_(write(tmp_path / "log.csv", table), None, tmp_path / "log.parquet", None, None)
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    base = fit_nominal_parameters(prepared.train)
+    assert base.noise_ratios[0]["table"] > 25.0
+    assert accepted(reproduction(base, prepared.held_out))

@@ -63,6 +63,9 @@ def _second_encoder(told: PlantTold) -> list[str]:
     unit = "rad" if told.turns else "m"
     lead, seen = told.lead, told.transmission
     line = f"Second encoder: {_shown(lead, unit)} per revolution of the motor, {quantity(seen.left_m, unit)} rms left"
+    if seen.delay_s.significant:
+        late = seen.delay_s.value
+        line += f", {quantity(abs(late), 's')} {'late' if late > 0.0 else 'early'}"
     if seen.friction_m.significant:
         line += f", {quantity(2.0 * abs(seen.friction_m.value), unit)} between directions"
     return [f"{line}."]

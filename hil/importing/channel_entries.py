@@ -166,9 +166,8 @@ class ChannelEntries:
             draft.lead_how = f"travel of {name} per turn of {by_speed[1]}"
         else:
             draft.lead_m = LEADS_M[0]
-            draft.asked.append(
-                Asked("", "lead_m", f"{name} is a length: the metres per revolution of the motor, such as 0.010")
-            )
+            what = "counts along a length" if counted else "is a length"
+            draft.asked.append(Asked("", "lead_m", f"{name} {what}: the metres per revolution of the motor, as 0.010"))
             return
         draft.unsure.append(f"{name}: is a length; {1e3 * draft.lead_m:g} mm per turn are taken ({draft.lead_how})")
 

@@ -14,23 +14,25 @@ from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from hil.bench.bench_file import Bench, load_bench
-from hil.diagnosis.diagnose import diagnose
-from hil.diagnosis.diagnosis import Diagnosis
 from hil.drafting.draft_mark import draft_state, marked
-from hil.drafting.drafted_bench import DraftedBench, drafted
+from hil.drafting.first_look import first_look
 from hil.errors import InputError, PartOfAxis, RateNeeded, listed
 from hil.exchange.own_file import read_exported
 from hil.files.input_file import is_file
 from hil.files.output import rewritten_folder, write_text
-from hil.identification.measured import bench_of
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import take_own_units
 from hil.recording.recording import Recording, read_recording
-from hil.report.diagnosis_report import write_diagnosis
+
+# Bench, draft and diagnosis load compiled kernels and more, for which the first look must not wait.
+if TYPE_CHECKING:
+    from hil.bench.bench_file import Bench
+    from hil.diagnosis.diagnosis import Diagnosis
+    from hil.drafting.drafted_bench import DraftedBench
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
 _DRAFTED_WITH = "# Drafted with: "  # options, at the end of a map
@@ -93,6 +95,7 @@ def explain(
     rate_hz: float | None = None,
     axis: str | None = None,
     progress: Callable[[str], None] = lambda text: None,
+    look: Callable[[list[str]], None] = lambda lines: None,
     first: Callable[[Basis], None] = lambda basis: None,
     answer: Callable[[Diagnosis], None] = lambda diagnosis: None,
     budget_s: float | None = None,
@@ -101,8 +104,9 @@ def explain(
 
     sources: a file or several, any that `hil import` reads. folder: None takes explained-NAME of the first file; maps
     and bench that are there are used, so correct them and call again. rate_hz: rows per second of files without time
-    stamps. axis: that of files with several. progress: called with each step. first: called with what is known before
-    the search. answer: called with the diagnosis before its page is drawn. budget_s: processor time of the search [s].
+    stamps. axis: that of files with several. progress: called with each step. look: called with what the recordings
+    show without a twin, as soon as they are read. first: called with what is known before the search. answer: called
+    with the diagnosis before its page is drawn. budget_s: processor time of the search [s].
 
     Returns `diagnosis`, `bench`, `recordings`, `assumed`, `folder` and `report`. Raises InputError for a file that
     cannot be read, with the lines of its map that the user must complete, and for recordings that cannot be diagnosed.
@@ -127,11 +131,15 @@ def explain(
             ) from None
         read.append(recording)
         assumed += notes
+    look(first_look(read))
     progress("taking the bench, or drafting it")
     bench, draft, notes = _bench(read, folder / BENCH)
     warnings = [one for one in notes if OUTDATED in one]
     basis = Basis(tuple(read), bench, draft, (*warnings, *assumed, *(one for one in notes if one not in warnings)))
     first(basis)
+    from hil.diagnosis.diagnose import diagnose
+    from hil.report.diagnosis_report import write_diagnosis
+
     with rewritten_folder(folder / REPORT, PAGE) as part:
         diagnosis = diagnose(read, (), bench, progress, budget_s)
         answer(diagnosis)
@@ -189,6 +197,8 @@ def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedB
 
     A draft that nobody edited is made anew where the map or the data changed.
     """
+    from hil.bench.bench_file import load_bench
+
     state, notes = None, list[str]()
     if is_file(path):
         state = draft_state(path.read_text(encoding="utf-8"), recordings)
@@ -197,7 +207,11 @@ def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedB
             return load_bench(path), None, [*changed, f"{path}: used as it is"]
         notes = [f"{path}: drafted anew, as the map or the data changed, and nobody had edited it"]
     elif "bench" in recordings[0].metadata:
+        from hil.identification.measured import bench_of
+
         return bench_of(recordings[0]), None, [f"{recordings[0].name}: the bench with which it was recorded"]
+    from hil.drafting.drafted_bench import drafted
+
     draft = drafted(recordings)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, marked(draft.text, recordings))

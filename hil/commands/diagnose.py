@@ -7,7 +7,7 @@ import typer
 
 from hil.commands.options import Out, RecordedBench
 from hil.commands.runs import read_run
-from hil.report.console import out, progress
+from hil.report.console import out, print_look, progress
 
 
 def diagnose(
@@ -36,6 +36,13 @@ def diagnose(
     ] = None,
 ) -> None:
     """Find physics that the twin lacks: where it acts, which mechanism it is, and whether modelling it helps."""
+    from hil.drafting.first_look import first_look
+
+    train = [read_run(path) for path in runs]
+    held_out = [read_run(path) for path in validate or []]
+    print_look(first_look(train))
+
+    # what follows loads compiled kernels and more, for which the first look does not wait
     from hil.bench.bench_file import load_bench
     from hil.commands.warm_up import compile_kernels
     from hil.compensating.old_tables import old_tables, reach_of_recording
@@ -47,8 +54,6 @@ def diagnose(
     from hil.report.diagnosis_report import write_diagnosis
     from hil.report.summary import print_diagnosis
 
-    train = [read_run(path) for path in runs]
-    held_out = [read_run(path) for path in validate or []]
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
     compile_kernels()

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hil.commands.options import AxisInNames, Rate
-from hil.report.console import err, out, progress, table
+from hil.report.console import err, out, print_look, progress, table
 
 if TYPE_CHECKING:
+    from hil.diagnosis.diagnosis import Diagnosis
     from hil.explanation import Basis
 
 
@@ -48,18 +49,27 @@ def explain(
     from hil.explanation import OUTDATED
     from hil.explanation import explain as explain_files
     from hil.files.optional_library import page_line
-    from hil.report.summary import print_diagnosis
 
-    compile_kernels()
     with progress() as tell:
+
+        def look(lines: list[str]) -> None:
+            print_look(lines)
+            compile_kernels(tell)
+
+        def answer(diagnosis: "Diagnosis") -> None:
+            from hil.report.summary import print_diagnosis
+
+            print_diagnosis(diagnosis.result)
+
         found = explain_files(
             data,
             folder,
             rate_hz=rate_hz,
             axis=axis,
             progress=tell,
+            look=look,
             first=_first_answer,
-            answer=lambda diagnosis: print_diagnosis(diagnosis.result),
+            answer=answer,
             budget_s=budget_s,
         )
     for warning in (one for one in found.assumed if OUTDATED in one):

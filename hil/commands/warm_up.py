@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 from hil.compiled.kernel_cache import provide_kernel_cache
-from hil.report.console import out, progress
+from hil.report.console import Progress, out, progress
 
 
 def warm_up() -> None:
@@ -14,12 +15,15 @@ def warm_up() -> None:
     out.print(f"All kernels are compiled in {provide_kernel_cache()}")
 
 
-def compile_kernels() -> None:
-    """Compile all kernels if they are not compiled yet, with a progress bar; raises HilError without a cache folder."""
+def compile_kernels(shown: Progress | None = None) -> None:
+    """Compile all kernels if they are not compiled yet; raises HilError without a cache folder.
+
+    Progress goes to the bar `shown`, or to one of its own.
+    """
     if kernels_are_compiled():
         return
     mark, versions = _mark(), _versions()
-    with progress() as tell:
+    with progress() if shown is None else nullcontext(shown) as tell:
         task = "compiling kernels, once after the installation: about a minute"
         tell(task, 0.0)
         # imported late: the kernels are built by the first imports

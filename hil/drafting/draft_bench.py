@@ -1,22 +1,17 @@
 """Draft a bench file from a recording: kind of axis, masses, friction, lead, gains, encoders, each with its error."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot, log2, pi, sqrt
 
-import numpy as np
-
 from hil.channels import AxisKind
-from hil.drafting.assumed_plant import plant_or_assumed
 from hil.drafting.bench_notes import bench_notes
 from hil.drafting.bench_value import BenchValue
 from hil.drafting.identifiable import refuse_untold
 from hil.drafting.loop_values import loop_values
-from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
-from hil.drafting.ratio_values import gear_of, lead_of
+from hil.drafting.plant_told import moving_parts, plant_told
+from hil.drafting.plant_values import PlantValues, TransmissionValues
+from hil.drafting.ratio_values import gear_of
 from hil.drafting.sensor_values import noise_of
-from hil.errors import InputError
-from hil.identification.derived_channels import with_position
 from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
 from hil.quantities import ROTARY_LEAD_M, digits, unit_of
@@ -26,10 +21,8 @@ from hil.twin.mechanisms import constant_load, gravity_torque
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 _MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
-LONGEST_LEAD_M = 1.0  # that a bench file takes; a load that turns as far as its motor, 1 m for 1 rad, has 6.3
 # Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
-_MOVES = 0.1  # of the travel of the part that moves farthest, from which a part tells ratio and control law
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -59,19 +52,9 @@ def draft_bench(*recordings: Recording) -> BenchDraft:
     wrong sign, errors above all values without another one that is told; and for recordings of different kinds or
     channels.
     """
-    parts = [part for recording in recordings for part in with_position(recording).parts()]
-    first = parts[0]
-    for part in parts:
-        missing = {first.axis.motor_position, first.axis.torque, first.axis.table_position} & set(first.columns)
-        if missing := missing - set(part.columns):
-            raise InputError(
-                f"{part.name}: {', '.join(sorted(missing))} is not recorded as in {first.name}, allowed are recordings "
-                "of one axis with the same channels; leave one out"
-            )
-    travels = [float(np.ptp(part[part.axis.motor_position])) for part in parts]
-    moving = [part for part, travel in zip(parts, travels, strict=True) if travel >= _MOVES * max(travels)]
-    longest = max(moving, key=len)
-    draft = _draft_parts([longest, *(part for part in parts if part is not longest)])
+    parts = moving_parts(recordings)
+    longest = parts[0]
+    draft = _draft_parts(parts)
     draft.name = recordings[0].name
     if len(parts) > 1:
         seconds = len(longest) * longest.period_s
@@ -83,24 +66,17 @@ def draft_bench(*recordings: Recording) -> BenchDraft:
     return draft
 
 
-def _draft_parts(recordings: Sequence[Recording]) -> BenchDraft:
+def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
     """Draft the bench from recordings without gaps, the first of which tells all but masses and friction."""
-    recording = recordings[0]
-    transmission, ratio = transmission_values(recording), 1.0
-    volts = turns = False
+    recording, told = recordings[0], plant_told(recordings)
+    plant, transmission, turns, ratio = told.plant, told.transmission, told.turns, 1.0
+    volts = False
     draft = BenchDraft(recording.name, recording.kind, "one_mass")
-    if recording.kind is AxisKind.LINEAR:
-        plant = plant_values(recordings)
+    if told.lead is None:
         draft.axis.append(_value("mass_kg", plant.inertia, "kg"))
         draft.axis += [_friction("coulomb_force_n", plant.coulomb), _friction("viscous_force_n_s_m", plant.viscous)]
     else:
-        lead = lead_of(recording, transmission)
-        ratio = lead.value / (2.0 * pi)
-        turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
-        plant = plant_or_assumed(recordings, transmission, ratio if turns else None)
-        if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
-            transmission = transmission_values(recording, plant.gravity_angle.value)
-            lead = lead_of(recording, transmission)
+        lead, ratio = told.lead, told.lead.value / (2.0 * pi)
         deflection = None if transmission is None else _deflection_s2(transmission)
         sag = _sagging(plant, transmission)
         volts = turns and deflection is None and _in_volts(recording) and plant.viscous.significant

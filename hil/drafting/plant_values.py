@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from hil.errors import InputError
 from hil.identification.derivatives import motion, rows_per_sample, smoothed
@@ -148,7 +147,7 @@ def _at_feeds(
         return None
     how = f"{len(found.points)} constant feeds; all rows tell it less well"
     # the error of a few points is known badly (Student's t)
-    wider = float(student.ppf(0.975, len(found.points) - 3) / norm.ppf(0.975))
+    wider = float(stdtrit(len(found.points) - 3, 0.975) / ndtri(0.975))
     at_feeds = (
         Estimate(found.viscous, wider * found.viscous_std_error, how),
         Estimate(found.coulomb, wider * found.coulomb_std_error, how),

@@ -20,19 +20,22 @@ _LIKELY = 2.0  # standard errors within which a round value is taken
 def lead_of(recording: Recording, transmission: TransmissionValues | None) -> Estimate:
     """Travel per motor revolution [m]; on a rotary axis that of the load in rad.
 
-    Of two encoders, else of set-points and encoder. The lead of the import map, or a usual one, is taken only where
-    the measured one does not contradict it: what the bench file says would else be named as an error of the machine.
+    Of two encoders, else of set-points and encoder, else that of the import map, which of motor channels alone makes a
+    screw. Beside a measured lead that of the map, or a usual one, is taken only where they do not contradict each
+    other: what the bench file says would else be named as an error of the machine.
     """
-    names = recording.axis
+    names, told = recording.axis, recording.metadata.get("lead_m")
     if transmission is not None:
         measured = transmission.ratio.scaled(2.0 * pi)
     elif names.position_command in recording.columns:
         measured = _of_set_points(recording).scaled(2.0 * pi)
+    elif told not in (None, ROTARY_LEAD_M):  # the motor's own channels of a screw
+        return Estimate(told, 0.0, "lead of the map; one encoder and no set-points do not measure it")
     else:
         return Estimate(ROTARY_LEAD_M, 0.0, "one encoder and no set-points: no ratio is told")
     if abs(measured.value - ROTARY_LEAD_M) < max(DIRECT * ROTARY_LEAD_M, _LIKELY * measured.std_error):
         return Estimate(ROTARY_LEAD_M, measured.std_error, f"direct; {measured.how}")
-    told, usual = recording.metadata.get("lead_m"), usual_lead(measured.value)
+    usual = usual_lead(measured.value)
     lead = told if told not in (None, ROTARY_LEAD_M) and _agrees(told, measured) else usual
     if lead == measured.value:
         return measured

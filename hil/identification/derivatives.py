@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import convolve1d
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from hil.arrays import FloatArray
+from hil.identification.parabola import parabola_filter, parabola_weights
 
 SMOOTH_S = 0.021  # window of the parabolas: passes some 20 Hz, averages encoder counts
 _AT_REST = 0.01  # of the top speed: below lie rest and noise
@@ -90,7 +90,7 @@ def noise_gains(period_s: float, rows: int) -> tuple[float, float, float]:
 
 def _kernel(rows: int) -> FloatArray:
     """K, (rows - 2,): the second sum of the weights of the parabola's curvature."""
-    weights = np.cumsum(np.cumsum(savgol_coeffs(rows, 2, deriv=2)))[:-2]
+    weights = np.cumsum(np.cumsum(parabola_weights(rows, 2)))[:-2]
     return np.asarray(weights / weights.sum(), dtype=np.float64)
 
 
@@ -99,4 +99,4 @@ def _filtered(values: FloatArray, period_s: float, order: int, smooth_s: float) 
     window = min(window_rows(period_s, smooth_s), (values.size - 1) | 1)
     if window < 3:
         return np.zeros(values.size) if order else values
-    return np.asarray(savgol_filter(values, window, 2, deriv=order, delta=period_s), dtype=np.float64)
+    return parabola_filter(values, window, order, period_s)

@@ -8,18 +8,22 @@ The set-points then only tell motion from rest; nothing is simulated from them. 
 input for the twin and no measurement: the residuals of motor and torque are left out (`Observability.hidden`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from hil.arrays import FloatArray
-from hil.bench.bench_file import Bench
 from hil.errors import InputError
 from hil.identification.derivatives import motion, window_rows
 from hil.identification.sensor_noise import white_noise
 from hil.recording.recording import RESAMPLED, Recording
+
+if TYPE_CHECKING:
+    from hil.bench.bench_file import Bench
 
 _REST = 5.0  # speed at rest in standard deviations of its noise: one row in a million is above
 _SLOW = 1e-3  # of the top speed: below lies rest, as for set-points (`sensor_noise.moving`)
@@ -76,6 +80,8 @@ def with_position(recording: Recording) -> Recording:
             f"{recording.name}: {names.motor_position} is not recorded, allowed are recordings with it or with "
             f"{names.motor_velocity}; record one of them"
         )
+    from scipy.integrate import cumulative_trapezoid  # rarely needed, and slow to load
+
     travelled = cumulative_trapezoid(columns[names.motor_velocity], dx=recording.period_s, initial=0.0)
     position = {names.motor_position: np.asarray(travelled, dtype=np.float64)}
     derived = {**recording.metadata.get(DERIVED, {}), names.motor_position: f"sum of {names.motor_velocity}"}

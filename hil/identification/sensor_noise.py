@@ -1,14 +1,19 @@
 """White noise of the sensors of a recording, each estimated from its own channel."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.bench.bench_file import Bench
 from hil.identification.plain_model import fit_plain_model, motion_data
 from hil.recording.quantum import count_of
+
+if TYPE_CHECKING:
+    from hil.bench.bench_file import Bench
 
 _COARSER = 1.5  # factor of a recorded step over the count of the bench: one count, seen with noise, is below
 _RESPONSE_ROWS = 20  # of the current loop and its delays: 4 to 50 ms at 5 kHz to 400 Hz

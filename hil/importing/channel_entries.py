@@ -95,7 +95,7 @@ class ChannelEntries:
     def _positions(self, name: str) -> None:
         """Add the motor's position `name`, the lead, and the other positions."""
         draft, roles, live, motor = self.draft, self.roles, self.live, self.units[name]
-        keys: dict[str, object] = {"unit": motor}
+        keys, told = dict[str, object](unit=motor), draft.table.constants.get(Constant.LEAD)
         far = [other for other in (roles.table, roles.command) if other]
         relations = {other: proportional(live[other], live[name]) for other in far}
         trusted = [other for other in far if relations[other].share > 0.9]
@@ -124,13 +124,14 @@ class ChannelEntries:
             elif length is not None:
                 per_turn = abs(relations[length].factor) * UNITS[self.units[length]][1] / self.per_count
                 lead_m = 2.0 * pi * per_turn / UNITS[motor][1]
-                told = draft.table.constants.get(Constant.LEAD)
                 nominal = told is not None and abs(told.value / lead_m - 1.0) < MATCH
                 draft.lead_m = told.value if told and nominal else float(f"{usual_lead(lead_m):.6g}")
                 draft.lead_how = f"travel of {length} per turn of {name}"
+            elif told and not roles.table:
+                draft.lead_m, draft.lead_how = told.value, f"header of the file: {told.text}"
             else:
                 draft.lead_m = ROTARY_LEAD_M
-                draft.lead_how = "a rotary axis: one metre of the load stands for one radian"
+                draft.lead_how = "a rotary axis: one metre of the load is one radian. Of a screw write its lead"
                 keys |= {} if counted or roles.table else self._gear(name)
         keys |= {"sign": -1} if self.motor_sign < 0 else {}
         self._add(channel, name, "steps of the motor" if self.labels[name].command else "the motor's encoder", keys)
@@ -161,15 +162,12 @@ class ChannelEntries:
         if told is not None:
             draft.lead_m, draft.lead_how = told.value, f"header of the file: {told.text}"
         elif by_speed is not None:
-            draft.lead_m, draft.lead_how = (
-                float(f"{usual_lead(by_speed[0]):.6g}"),
-                f"travel of {name} per turn of {by_speed[1]}",
-            )
+            draft.lead_m = float(f"{usual_lead(by_speed[0]):.6g}")
+            draft.lead_how = f"travel of {name} per turn of {by_speed[1]}"
         else:
             draft.lead_m = LEADS_M[0]
-            draft.asked.append(
-                Asked("", "lead_m", f"{name} is a length: the metres per revolution of the motor, such as 0.010")
-            )
+            what = "counts along a length" if counted else "is a length"
+            draft.asked.append(Asked("", "lead_m", f"{name} {what}: the metres per revolution of the motor, as 0.010"))
             return
         draft.unsure.append(f"{name}: is a length; {1e3 * draft.lead_m:g} mm per turn are taken ({draft.lead_how})")
 

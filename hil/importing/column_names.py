@@ -43,6 +43,7 @@ class Label:
     part: bool = False  # of a torque: friction, gravity
     letter: bool = False  # one letter says its quantity, beside nothing else that is known
     encoder: bool = False  # a word says that an encoder measured it
+    steps: bool = False  # a word says that it counts the steps of a stepper
 
     @property
     def sure(self) -> bool:
@@ -88,10 +89,11 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     elif unit and unit not in QUANTITY_OF_UNIT:
         unit = None
     known = lexicon()
+    steps = _any(words, known.steps) and not _any(words, known.encoder)
     return Label(
         column,
         quantity,
-        _any(words, known.command) or (_any(words, known.steps) and not _any(words, known.encoder)),
+        _any(words, known.command) or steps,
         _any(words, known.measured),
         _any(words, known.motor),
         _any(words, known.table),
@@ -103,6 +105,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _any(words, known.part),
         not words_beside and quantity is not Quantity.TIME and (len(name.strip()) == 1 or strange),
         _any(words, known.encoder),
+        steps,
     )
 
 

@@ -154,7 +154,8 @@ def _positions(
             names.remove(name)
     commands = [name for name in names if labels[name].command]
     measured = [name for name in names if name not in commands]
-    if not efforts and len(commands) == 1 == len(measured) and follows_steps(live[commands[0]], live[measured[0]]):
+    alone = not efforts and len(commands) == 1 == len(measured)
+    if alone and follows_steps(live[commands[0]], live[measured[0]], labels[commands[0]].steps):
         (roles.motor,), (roles.table,) = commands, measured
         roles.unsure.append(
             f"{roles.motor}: set-point in steps, which {roles.table} follows by one ratio; without a torque it stands "

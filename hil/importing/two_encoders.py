@@ -53,11 +53,12 @@ def motors_encoder(
     return None
 
 
-def follows_steps(command: FloatArray, measured: FloatArray) -> bool:
-    """True if the counts `measured` by an encoder follow the steps of a stepper's `command`, both (n,) whole numbers.
+def follows_steps(command: FloatArray, measured: FloatArray, named: bool) -> bool:
+    """True if an encoder `measured` (n,) follows the steps of a stepper's `command` (n,), which are whole numbers.
 
-    A servo drive gives its set-points in the counts of its encoder: one count for a step is none of a stepper.
+    Names that do not say steps need counts of the encoder: a servo drive gives its set-points in these, one for one,
+    which is no stepper.
     """
     relation = proportional(measured, command)
-    steps = are_counts(command) and are_counts(measured) and relation.share > SAME_POSITION
-    return steps and abs(abs(relation.factor) - 1.0) > MATCH
+    follows = are_counts(command) and relation.share > SAME_POSITION
+    return follows and (named or (are_counts(measured) and abs(abs(relation.factor) - 1.0) > MATCH))

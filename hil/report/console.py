@@ -57,3 +57,10 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], *, right: bool 
     for row in rows:
         view.add_row(*row)
     out.print(view)
+
+
+def print_look(lines: Sequence[str]) -> None:
+    """Print what recordings show before a twin is compared with them."""
+    for line in lines:
+        out.print(line)
+    out.print()

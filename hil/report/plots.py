@@ -11,7 +11,7 @@ from bokeh.plotting import figure
 from hil.arrays import FloatArray
 from hil.figures.panels import NOISE, Panel, thin
 
-DRAWN_ROWS = 12_000  # of a panel: keeps a page of 16 panels below 8 MB
+DRAWN_ROWS = 6_000  # of a panel: several per pixel, and a page of 16 panels stays below 3 MB
 
 
 def over_time(time_s: FloatArray, panels: Sequence[Panel], heights: Sequence[int] = ()) -> Any:

@@ -57,7 +57,7 @@ def test_one_command_writes_map_bench_and_page(explained: tuple[Path, str, str])
 
 def test_the_first_answer_comes_before_the_search(explained: tuple[Path, str, str]) -> None:
     _, out, _ = explained
-    assert out.index("coulomb_torque_n_m") < out.index("noise floor")
+    assert out.index("Plain model: inertia") < out.index("coulomb_torque_n_m") < out.index("noise floor")
 
 
 def test_a_corrected_bench_is_taken_up_again(explained: tuple[Path, str, str]) -> None:

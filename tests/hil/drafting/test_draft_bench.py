@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -300,3 +301,24 @@ def test_a_draft_that_is_no_valid_bench_is_not_written(tmp_path: Path, monkeypat
     with pytest.raises(InputError, match="no valid bench"):
         identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
     assert not (tmp_path / "axis.yaml").exists()
+
+
+@pytest.mark.parametrize("header", ["", "# Lead: 10 mm\n"])
+def test_the_lead_makes_a_screw_of_the_channels_of_the_motor_alone(tmp_path: Path, header: str) -> None:
+    source, target = tmp_path / "log.csv", tmp_path / "log.parquet"
+    write(source, renamed(AXIS, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
+    source.write_text(header + source.read_text())
+    import_(source, None, target, None, None)
+    if not header:  # the owner writes the lead into the map
+        path = tmp_path / "log-map.yaml"
+        mended = re.sub(r"^lead_m: 6\.28\S+", "lead_m: 0.010", path.read_text(), flags=re.MULTILINE)
+        assert mended != path.read_text()
+        path.write_text(mended)
+        target = tmp_path / "screw.parquet"
+        import_(source, str(path), target, None, None)
+    identify([target], tmp_path / "axis.yaml")
+    bench = load_bench(tmp_path / "axis.yaml")
+    assert bench.axis.model == "rigid"
+    assert bench.axis.lead_m == LEAD_M
+    assert bench.axis.mass_kg == pytest.approx(INERTIA_KG_M2 * (2 * np.pi / LEAD_M) ** 2, rel=0.01)
+    assert "lead of the map" in (tmp_path / "axis.yaml").read_text()

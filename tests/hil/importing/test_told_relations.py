@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from foreign_axis import axis, csv_text
 
+from hil.drafting.first_look import first_look
 from hil.errors import InputError, PartOfAxis
 from hil.explanation import explain
+from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_draft import MapDraft
 from hil.importing.own_units import take_own_units
@@ -85,6 +88,23 @@ def test_steps_that_an_encoder_follows_are_the_motion(tmp_path: Path, command: s
     take_own_units(draft)
     motor, table = (float(str(one.entry["counts_per_rev"])) for one in draft.channels)
     assert table / motor == pytest.approx(0.375)
+
+
+def test_steps_beside_a_linear_scale_tell_all_but_the_lead(tmp_path: Path) -> None:
+    """Delay, lost motion and scale of an axis without a torque; the travel per turn is asked."""
+    folder, source, late = tmp_path / "out", tmp_path / "log.csv", 0.004
+    angle = np.interp(T - late, T, AXIS["angle"])
+    scale = np.round(1e4 * angle / (2 * np.pi) * 5.0) / 1e4
+    source.write_text(csv_text({"t_s": T, "Sollschritte": STEPS, "Massstab [mm]": scale}))
+    with pytest.raises(InputError, match=r"lead_m: Sollschritte counts along a length"):
+        explain(source, folder)
+    path = folder / "log-map.yaml"
+    path.write_text(re.sub(r"^lead_m:.*", "lead_m: 0.005", path.read_text(), flags=re.MULTILINE))
+    look = first_look([import_recording(source, path)])
+    assert look[1].startswith("No torque is recorded")
+    found = re.search(r"0\.0050\d* m .* per revolution of the motor.*, ([\d.]+) ms late", look[2])
+    assert found, look
+    assert float(found[1]) == pytest.approx(1e3 * late, abs=0.2)
 
 
 def test_a_set_point_in_the_counts_of_the_encoder_is_none_of_a_stepper(tmp_path: Path) -> None:

@@ -1,0 +1,75 @@
+"""What recordings show at once, before any twin: how they move, the plain model, the second encoder."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hil.channels import AxisKind
+from hil.drafting.assumed_plant import ASSUMED
+from hil.drafting.plant_told import PlantTold, moving_parts, plant_told
+from hil.errors import InputError
+from hil.identification.least_squares import Estimate
+from hil.quantities import digits, percent, quantity
+from hil.recording.recording import Recording
+
+
+def first_look(recordings: Sequence[Recording]) -> list[str]:
+    """Lines on recordings of one axis: duration and speed, plain model with standard errors, second encoder.
+
+    What cannot be told is said with its reason; nothing is raised.
+    """
+    try:
+        parts = moving_parts(recordings)
+        lines = [_moves(parts)]
+        told = plant_told(parts)
+    except InputError as error:
+        return [f"No plain model: {error}"]
+    return [*lines, *_plain(told, parts[0]), *_second_encoder(told)]
+
+
+def _moves(parts: Sequence[Recording]) -> str:
+    seconds = sum(len(part) * part.period_s for part in parts)
+    names, unit = parts[0].axis, "m" if parts[0].kind is AxisKind.LINEAR else "rad"
+    travel = max(float(np.ptp(part[names.motor_position])) for part in parts)
+    return (
+        f"{sum(map(len, parts))} rows, {digits(seconds)} s at {digits(1e3 * parts[0].period_s)} ms; "
+        f"the motor travels {quantity(travel, unit)}"
+    )
+
+
+def _plain(told: PlantTold, recording: Recording) -> list[str]:
+    """The plain model in units of the motor; nothing where it was assumed."""
+    plant = told.plant
+    if plant.inertia.how == ASSUMED:
+        return ["No torque is recorded: masses and friction cannot be told."]
+    linear = recording.kind is AxisKind.LINEAR
+    units = ("kg", "N s/m", "N", "N") if linear else ("kg m^2", "N m s/rad", "N m", "N m")
+    named = {
+        "mass" if linear else "inertia at the motor": plant.inertia,
+        "viscous friction": plant.viscous,
+        "Coulomb friction": plant.coulomb,
+        "constant load": plant.offset,
+    }
+    values = ", ".join(f"{name} {_shown(one, unit)}" for (name, one), unit in zip(named.items(), units, strict=True))
+    return [
+        f"Plain model: {values}; it leaves {percent(plant.left)} of the "
+        f"{'force' if linear else 'torque'} (share of its standard deviation)."
+    ]
+
+
+def _second_encoder(told: PlantTold) -> list[str]:
+    if told.transmission is None or told.lead is None:
+        return []
+    unit = "rad" if told.turns else "m"
+    lead, seen = told.lead, told.transmission
+    line = f"Second encoder: {_shown(lead, unit)} per revolution of the motor, {quantity(seen.left_m, unit)} rms left"
+    if seen.delay_s.significant:
+        late = seen.delay_s.value
+        line += f", {quantity(abs(late), 's')} {'late' if late > 0.0 else 'early'}"
+    if seen.friction_m.significant:
+        line += f", {quantity(2.0 * abs(seen.friction_m.value), unit)} between directions"
+    return [f"{line}."]
+
+
+def _shown(one: Estimate, unit: str) -> str:
+    return f"{digits(one.value)} {unit} +-{one.std_error:.2g}"

@@ -23,7 +23,7 @@ from hil.importing.text_rows import Cell, TextRows, read_rows
 from hil.importing.variables import VARIABLE_ENDINGS, load_variables
 from hil.recording.arrow_files import numbers, read_parquet
 
-TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn")
+TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn", ".psv")
 LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
 _ENDINGS = (".csv", ".mat", ".parquet", *RECORD_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])

@@ -1,6 +1,5 @@
 """Processor time that a diagnosis may take, and an estimate of the time that it still takes."""
 
-import math
 import time
 from collections.abc import Callable
 
@@ -31,19 +30,18 @@ def usual_budget_s(rows: int) -> float:
 def with_time_left(progress: Callable[[str], None], begin_s: float, budget_s: float) -> Callable[[str], None]:
     """Return a receiver of steps that adds the estimated time left to each text and passes it on to `progress`.
 
-    Only a step whose share is known has an estimate. The rest of the budget bounds it while there is one: a budget
-    limits the search, and the steps after it may take longer. `begin_s` is the begin of the diagnosis on the monotonic
+    Only a step whose share is known has an estimate, and none after the budget, which limits the search: the steps
+    after it may take longer. `begin_s` is the begin of the diagnosis on the monotonic
     clock.
     """
 
     def tell(step: str) -> None:
         share = next((passed for words, passed in PASSED.items() if step.startswith(words)), None)
-        if share is None:
+        elapsed_s = time.monotonic() - begin_s
+        if share is None or elapsed_s >= budget_s:
             progress(step)
             return
-        elapsed_s = time.monotonic() - begin_s
-        rest_s = budget_s - elapsed_s if elapsed_s < budget_s else math.inf
-        left_s = min(elapsed_s * (1.0 / share - 1.0), rest_s)
+        left_s = min(elapsed_s * (1.0 / share - 1.0), budget_s - elapsed_s)
         text = f"{step} (about {digits(max(left_s, 1.0), 1)} s left)"
         progress(text)
 

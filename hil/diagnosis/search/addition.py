@@ -77,7 +77,7 @@ class Addition:
         if not above > CRITERIA.nothing * self.base.data.rows:
             return None
         left, without = self.torque or (0.0, 0.0)
-        return max(gained[channel] / above, 1.0 - (left / without) ** 2 if without > 0.0 else 0.0)
+        return min(max(gained[channel] / above, 1.0 - (left / without) ** 2 if without > 0.0 else 0.0), 1.0)
 
     @property
     def beside(self) -> int:

@@ -48,7 +48,7 @@ def test_a_budget_that_is_no_time_is_refused(budget_s: float) -> None:
         ("screening the library beside 0 terms", math.inf, " (about 1567 s left)"),
         ("screening the library beside 0 terms", 130.0, " (about 30 s left)"),
         ("testing on held-out recordings", 130.0, " (about 5 s left)"),
-        ("testing on held-out recordings", 90.0, " (about 5 s left)"),
+        ("fitting backlash", 90.0, ""),
         ("locating", 130.0, ""),
     ],
 )

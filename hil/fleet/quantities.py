@@ -1,0 +1,61 @@
+"""Quantities of the condition of an axis: names, units, the vendors' test of the same, and what change counts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+FRICTION, BACKLASH, EQUABILITY = "friction test", "backlash test", "equability test"
+STIFFNESS, QUADRANT = "stiffness test", "quadrant error (circularity test)"
+FREQUENCY = "frequency response"
+NO_RESPONSE = "a check motion does not excite it: record one with an excitation and call hil frf"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of the condition.
+
+    `worse`: 1 if more of it is worse, -1 if less is, 0 if any change is. `limit`: change that calls for a look, in the
+    unit of the quantity, or as a share of the first level if `relative`. These limits rank axes and alarm nobody; an
+    owner who knows better ones sorts by the numbers.
+    """
+
+    name: str
+    label: str
+    test: str
+    unit: str  # SI; "torque" and so on stand for the units of the axis
+    worse: int
+    limit: float
+    relative: bool = False
+
+    def unit_of(self, linear: bool) -> str:
+        """SI unit on a linear or a rotary axis."""
+        return _UNITS.get(self.unit, (self.unit, self.unit))[linear]
+
+
+_UNITS = {"torque": ("N m", "N"), "viscous": ("N m s/rad", "N s/m"), "inertia": ("kg m^2", "kg")}
+
+QUANTITIES: Sequence[Quantity] = (
+    Quantity("coulomb_forward", "Coulomb friction, forward", FRICTION, "torque", 1, 0.3, relative=True),
+    Quantity("coulomb_back", "Coulomb friction, back", FRICTION, "torque", 1, 0.3, relative=True),
+    Quantity("viscous_forward", "viscous friction, forward", FRICTION, "viscous", 1, 0.5, relative=True),
+    Quantity("viscous_back", "viscous friction, back", FRICTION, "viscous", 1, 0.5, relative=True),
+    Quantity("ripple", "torque unlike the friction line (rms)", EQUABILITY, "torque", 1, 1.0, relative=True),
+    Quantity("reversal", "reversal difference of the encoders", BACKLASH, "m", 1, 10e-6),
+    Quantity("reversal_error", "peak of the following error after reversals", QUADRANT, "m", 1, 10e-6),
+    Quantity("stiffness", "stiffness of the transmission", STIFFNESS, "N/m", -1, 0.2, relative=True),
+    Quantity("lead_error", "lead error, once per turn", "", "m", 1, 5e-6),
+    Quantity("lead_slope", "lead against its nominal value", "", "m/m", 0, 50e-6),
+    Quantity("table_delay", "table encoder later than the motor's", "", "s", 0, 100e-6),
+    Quantity("torque_delay", "torque later than the motion", "", "s", 0, 500e-6),
+    Quantity("inertia", "inertia that moves", "", "inertia", 0, 0.1, relative=True),
+    Quantity("twin_left", "torque that the twin leaves", "", "1", 1, 0.1),
+)
+BY_NAME = {one.name: one for one in QUANTITIES}
+
+
+@dataclass(frozen=True)
+class Told:
+    """Value and standard error of a quantity by one recording, SI; without a value the reason."""
+
+    value: float | None = None
+    error: float | None = None
+    reason: str = ""

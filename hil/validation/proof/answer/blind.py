@@ -26,8 +26,9 @@ from hil.errors import HilError
 from hil.files.output import write_json, write_text
 from hil.motion.profile import write_profile
 from hil.validation.proof.case_folder import cases_in
-from hil.validation.proof.code import code_sha256, versions
+from hil.validation.proof.code import code_sha256
 from hil.workers.cluster import cluster
+from hil.workers.code import versions
 from hil.workers.pool import completed, local
 
 DIAGNOSIS, ERROR = "diagnosis.json", "error.json"

@@ -66,9 +66,9 @@ def _friction(run: Measured, motion: MotionData, sliding: NDArray[np.bool_], con
     moved, inertial = motion.moved, constants.inertia * motion.moved.acceleration
     rows = np.flatnonzero(sliding)[:: max(motion.window // 4, 1)]
     forward, back = moved.direction > 0.0, moved.direction < 0.0
-    columns = {
-        "coulomb_forward": forward * 1.0,
-        "coulomb_back": back * -1.0,
+    columns: dict[str, FloatArray] = {
+        "coulomb_forward": np.where(forward, 1.0, 0.0),
+        "coulomb_back": np.where(back, -1.0, 0.0),
         "viscous_forward": np.where(forward, moved.velocity, 0.0),
         "viscous_back": np.where(back, moved.velocity, 0.0),
         "torque_delay": np.gradient(inertial, run.period_s),

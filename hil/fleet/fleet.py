@@ -1,4 +1,4 @@
-"""The stages of a fleet, each of which goes on from what is there: index, constants of each axis, conditions, diagnoses.
+"""The stages of a fleet: index, constants of each axis, conditions, diagnoses, trends. Each goes on from what is there.
 
 A result has an id made of all that it depends on: the file with its size and stamp, then bench and map of the axis.
 What has changed is done again, and nothing else.
@@ -14,15 +14,18 @@ from functools import partial
 import pyarrow as pa
 
 from hil.errors import InputError
+from hil.files.optional_library import missing_of
 from hil.fleet.constants import FITTED, LOOKED_AT
 from hil.fleet.engine import BAD, GOOD, Engine, Item, Stage, columns
 from hil.fleet.quantities import QUANTITIES
-from hil.fleet.reading import BENCH, MAP, is_recording
+from hil.fleet.reading import BENCH, MAP, SERVICE, is_recording
 from hil.fleet.store import Entry, Row, Store
-from hil.fleet.work import diagnose_one, fit_axis, look_at, tell_condition
+from hil.fleet.work import diagnose_one, fit_axis, look_at, tell_condition, watch_axis
 
 METHOD = "1"  # of the quantities; another one makes them anew
-INDEX, CONSTANTS, CONDITION, DIAGNOSES = "index", "constants", "condition", "diagnoses_index"
+PAGES = "1"  # of the trends and their pages; another one makes them anew
+INDEX, CONSTANTS, CONDITION, DIAGNOSES, TRENDS = "index", "constants", "condition", "diagnosed", "trends"
+PAGE = "fleet.html"
 _NUMBER, _TEXT = pa.float64(), pa.string()
 _INDEX = columns(moment=_NUMBER, period_s=_NUMBER, duration_s=_NUMBER, channels=_TEXT, size=pa.int64())
 _CONSTANTS = columns(inertia=_NUMBER, inertia_error=_NUMBER, period_s=_NUMBER, fitted=_TEXT, bench=_TEXT)
@@ -33,6 +36,10 @@ _OF_QUANTITIES = {
 }
 _CONDITION = columns(moment=_NUMBER, **_OF_QUANTITIES)
 _DIAGNOSES = columns(verdict=_TEXT, statement=_TEXT, page=_TEXT)
+_TRENDS = columns(
+    need=_NUMBER, why=_TEXT, curve=_TEXT, tests=_TEXT, good=pa.int64(), bad=pa.int64(), service=_TEXT, newest=_TEXT,
+    changed=pa.bool_(),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -104,6 +111,12 @@ class Fleet:
         ]
         return [*told, *refused]
 
+    def pointed_at(self) -> list[str]:
+        """The newest recordings of the axes that need a look, or changed without a service, by the trends."""
+        return [
+            row["newest"] for row in self.results.rows(TRENDS) if row["need"] and (row["need"] >= 1 or row["changed"])
+        ]
+
     def diagnose(self, files: Collection[str]) -> list[Row]:
         """Diagnose recordings in full, those that have no diagnosis yet; returns a row for each."""
         conditions = {row["file"]: row for row in self.results.rows(CONDITION) if row["status"] == GOOD}
@@ -117,6 +130,37 @@ class Fleet:
             items.append(Item(_id(DIAGNOSES, row["id"]), row["axis"], file, given))
         stage = Stage(DIAGNOSES, _DIAGNOSES, partial(diagnose_one, self.recordings, self.results), alone=True)
         return self._run(stage, items)
+
+    def trend(self) -> list[Row]:
+        """Find the trend of each axis by what is compared, and write all pages; returns a row for each axis."""
+        index, conditions = self.results.rows(INDEX), self.results.rows(CONDITION)
+        if not conditions:
+            raise InputError(f"{self.recordings.url}: nothing is compared yet; call first: hil fleet compare")
+        diagnosed = defaultdict[str, list[Row]](list)
+        for row in self.results.rows(DIAGNOSES):
+            diagnosed[row["axis"]].append(row)
+        by_axis = defaultdict[str, list[str]](list)
+        for row in (*index, *conditions):
+            if row["axis"]:
+                by_axis[row["axis"]].append(row["id"])
+        stamps = {one.file: _stamp(one) for one in self.recordings.entries() if one.file.endswith(SERVICE)}
+        items = []
+        for axis, ids in by_axis.items():
+            given = json.dumps(diagnosed[axis])
+            items.append(
+                Item(
+                    _id(TRENDS, PAGES, axis, *sorted(ids), stamps.get(f"{axis}/{SERVICE}", ""), given), axis, "", given
+                )
+            )
+        rows = self._run(Stage(TRENDS, _TRENDS, partial(watch_axis, self.recordings, self.results)), items)
+        if not missing_of("report"):
+            from hil.fleet.fleet_page import fleet_page
+
+            bad = [row for row in (*index, *conditions) if row["status"] != GOOD]
+            name = self.recordings.url.rstrip("/").rpartition("/")[2] or "fleet"
+            told = [row for row in rows if row["status"] == GOOD]
+            self.results.write(PAGE, fleet_page(name, told, bad))
+        return rows
 
     def _run(self, stage: Stage, items: Sequence[Item]) -> list[Row]:
         return self.engine.run(stage, items, self.results.rows(stage.name))

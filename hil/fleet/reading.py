@@ -48,9 +48,9 @@ def moment_of(recording: Recording, file: str) -> datetime:
     except (ValueError, TypeError):
         pass
     if match := _DATE.search(Path(file).stem):
-        parts = [int(match[name] or 0) for name in ("y", "m", "d", "h", "min", "s")]
+        year, month, day, hour, minute, second = (int(match[name] or 0) for name in ("y", "m", "d", "h", "min", "s"))
         try:
-            return datetime(*parts, tzinfo=UTC)  # type: ignore[misc]
+            return datetime(year, month, day, hour, minute, second, tzinfo=UTC)
         except ValueError:
             pass
     raise InputError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from hil.errors import InputError
 from hil.fleet.engine import Item
-from hil.fleet.reading import BENCH, MAP, moment_of, read
+from hil.fleet.reading import BENCH, MAP, SERVICE, moment_of, read
 from hil.fleet.store import Row, Store
 
 if TYPE_CHECKING:
@@ -98,6 +98,41 @@ def diagnose_one(fleet: Store, results: Store, item: Item) -> Row:
         write_diagnosis(found, Path(folder), ())
         results.put(Path(folder), place)
     return {"verdict": str(found.result.verdict), "statement": found.result.statement, "page": f"{place}/report.html"}
+
+
+def watch_axis(fleet: Store, results: Store, item: Item) -> Row:
+    """Find the trend of an axis by the conditions in the dataset, and write its page and its JSON."""
+    from hil.channels import AxisKind
+    from hil.files.optional_library import missing_of
+    from hil.fleet.axis_page import axis_page
+    from hil.fleet.curves import small_curve
+    from hil.fleet.trend import as_json, date_of, read_services, trend
+    from hil.fleet.words import tests_of, why
+
+    index = {row["file"]: row for row in results.rows("index", item.axis)}
+    told = [row | {"moment": index[row["file"]]["moment"]} for row in results.rows("condition", item.axis)]
+    known = {row["file"] for row in told}
+    text = fleet.read(f"{item.axis}/{SERVICE}") or b""
+    services = read_services(text.decode("utf-8-sig", "replace"), f"{item.axis}/{SERVICE}")
+    channels = next((row["channels"] for row in index.values() if row["channels"]), "").split(",")
+    refused = [row for row in index.values() if row["file"] not in known]
+    found = trend(item.axis, [*told, *refused], services, AxisKind.of(channels) is AxisKind.LINEAR)
+    results.write(f"axes/{item.axis}.json", as_json(found).encode())
+    if not missing_of("report"):
+        results.write(f"axes/{item.axis}.html", axis_page(found, json.loads(item.given)))
+    leading = found.leading or next((one for one in found.courses if one.values.size), None)
+    last = services[-1:]
+    return {
+        "need": found.need,
+        "why": why(found),
+        "curve": str(small_curve(leading)) if leading else "",
+        "tests": json.dumps(tests_of(found)),
+        "good": found.good,
+        "bad": len(found.bad),
+        "service": f"{date_of(last[0].day)} {last[0].what}" if last else "",
+        "newest": found.newest,
+        "changed": any(one.open_changes for one in found.courses),
+    }
 
 
 def _prepare() -> None:

@@ -5,7 +5,8 @@
 Each segment has a level of its own, and a slope if that pays one more threshold (Jackson et al. 2005). chi^2 has the
 variance s_i^2 + b^2 of a recording, s_i its standard error and b the scatter between recordings, times what scatter
 that is correlated from one recording to the next adds in a mean, (1 + r) / (1 - r). All is estimated from differences
-of recordings one and two apart, which steps and slopes hardly change.
+of recordings one and two apart, which steps and slopes hardly change. Where recordings scatter less than the s_i say,
+these hold what is alike in all of them, and only weigh.
 
 The threshold. A recording a day is a look a day at n places, each for a step and a slope, of Q quantities. With
 
@@ -90,8 +91,7 @@ def history(day: FloatArray, values: FloatArray, errors: FloatArray, quantities:
     n = values.size
     if n < FEWEST:
         return None
-    variance, correlated = _scatter(values, errors)
-    total = np.maximum(variance + errors**2, 1e-300)
+    total, correlated = _scatter(values, errors)
     near = median_filter(values, _NEIGHBOURS, mode="nearest")
     clipped = np.clip(values, near - _CLIPPED * np.sqrt(total), near + _CLIPPED * np.sqrt(total))
     costs = _Costs(day, clipped, 1.0 / (total * correlated))
@@ -183,14 +183,19 @@ def _change(costs: _Costs, day: FloatArray, before: Stretch, after: Stretch) -> 
     )
 
 
-def _scatter(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """Variance between recordings beyond their errors, and the factor that its correlation makes."""
+def _scatter(values: FloatArray, errors: FloatArray) -> tuple[FloatArray, float]:
+    """Variance (n,) of each recording, and the factor that the correlation of neighbours makes.
+
+    Part of a standard error may be alike in all recordings and scatter less: then they only weigh.
+    """
     near, far = (_spread(values[lag:] - values[:-lag]) for lag in (1, 2))
-    own = float(np.median(errors) ** 2)
+    own = float(np.median(errors**2))
     by_chance = 0.5 / math.sqrt(values.size)
     correlation = float(np.clip(far / near - 1.0 - by_chance, 0.0, _MOST_CORRELATED)) if near > 0.0 else 0.0
-    variance = 0.5 * near / (1.0 - correlation)
-    return max(variance - own, 0.0), (1.0 + correlation) / (1.0 - correlation)
+    variance = max(0.5 * near / (1.0 - correlation), 1e-300)
+    beyond = max(variance - own, 0.0)
+    total = (errors**2 + beyond) * variance / (own + beyond)
+    return np.maximum(total, 1e-300), (1.0 + correlation) / (1.0 - correlation)
 
 
 def _spread(differences: FloatArray) -> float:

@@ -55,9 +55,9 @@ def condition(run: Measured, constants: Constants, set_points: bool = True) -> d
     found["twin_left"] = _twin_left(run, constants, found, SlowestSliding(_SLIDING * top, _SLIDING * top))
     found |= _table(run, motion, sliding, constants)
     if set_points:
-        found["reversal_error"] = _reversal_error(run, constants.bench.axis.ratio_m_rad)
+        found["quadrant"] = _reversal_error(run, constants.bench.axis.ratio_m_rad)
     else:
-        found["reversal_error"] = Told(reason="no set-points are recorded")
+        found["quadrant"] = Told(reason="no set-points are recorded")
     return found
 
 

@@ -112,10 +112,8 @@ class Fleet:
         return [*told, *refused]
 
     def pointed_at(self) -> list[str]:
-        """The newest recordings of the axes that need a look, or changed without a service, by the trends."""
-        return [
-            row["newest"] for row in self.results.rows(TRENDS) if row["need"] and (row["need"] >= 1 or row["changed"])
-        ]
+        """The newest recordings of the axes that changed without a service, by the trends."""
+        return [row["newest"] for row in self.results.rows(TRENDS) if row["changed"]]
 
     def diagnose(self, files: Collection[str]) -> list[Row]:
         """Diagnose recordings in full, those that have no diagnosis yet; returns a row for each."""

@@ -20,14 +20,14 @@ def fleet_page(name: str, rows: Sequence[Row], bad: Sequence[Row]) -> bytes:
     """The page of all axes; `rows` are those of their trends, `bad` those of recordings that cannot be used."""
     ordered = sorted(rows, key=lambda row: (-row["need"], row["axis"]))
     need = [row["axis"] for row in ordered if row["need"] >= 1.0]
-    changed = [row for row in ordered if 0.0 < row["need"] < 1.0]
+    changed = sum(row["changed"] and row["need"] < 1.0 for row in rows)
     few = ", ".join(need[:5]) + (f" and {len(need) - 5} more" if len(need) > 5 else "")
     verdict = f"{len(need)} of {len(rows)} axes need a look" + (f": {few}." if need else ".")
     recordings = sum(row["good"] for row in rows)
     page = Page(
         name,
-        f"{len(rows)} axes, {recordings} recordings, {len(bad)} bad ones · {len(changed)} more axes change, less than "
-        "calls for a look",
+        f"{len(rows)} axes, {recordings} recordings, {len(bad)} bad ones · axes that change less than calls for a look: "
+        f"{changed}",
         verdict,
         not need,
         f"{NEED} From 1 on the axis needs a look within {AHEAD_DAYS:g} days.",
@@ -65,4 +65,4 @@ def fleet_page(name: str, rows: Sequence[Row], bad: Sequence[Row]) -> bytes:
 
 
 def _link(axis: str) -> Markup:
-    return Markup(f'<a href="axes/{escape(axis)}.html">{escape(axis)}</a>')
+    return Markup(f'<a style="white-space: nowrap" href="axes/{escape(axis)}.html">{escape(axis)}</a>')

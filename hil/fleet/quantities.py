@@ -40,7 +40,7 @@ QUANTITIES: Sequence[Quantity] = (
     Quantity("viscous_back", "viscous friction, back", FRICTION, "viscous", 1, 0.5, relative=True),
     Quantity("ripple", "torque unlike the friction line (rms)", EQUABILITY, "torque", 1, 1.0, relative=True),
     Quantity("reversal", "reversal difference of the encoders", BACKLASH, "m", 1, 10e-6),
-    Quantity("reversal_error", "peak of the following error after reversals", QUADRANT, "m", 1, 10e-6),
+    Quantity("quadrant", "peak of the following error after reversals", QUADRANT, "m", 1, 0.5, relative=True),
     Quantity("stiffness", "stiffness of the transmission", STIFFNESS, "N/m", -1, 0.2, relative=True),
     Quantity("lead_error", "lead error, once per turn", "", "m", 1, 5e-6),
     Quantity("lead_slope", "lead against its nominal value", "", "m/m", 0, 50e-6),

@@ -22,6 +22,7 @@ from hil.fleet.store import Row
 
 DAY_S = 86400.0
 AHEAD_DAYS = 30.0
+COUNTS = 0.1  # of the change that calls for a look: a smaller one is measured, and told on the page of the axis alone
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,11 @@ class Course:
         return [one for at, one in enumerate(changes) if at not in (self.explained or {})]
 
     @property
+    def slopes(self) -> bool:
+        """True if it changes all the time now."""
+        return self.history is not None and self.history.now.slope != 0.0
+
+    @property
     def reference(self) -> float:
         """Level against which wear counts."""
         assert self.history is not None
@@ -68,6 +74,19 @@ class Course:
         return now.end + AHEAD_DAYS * now.slope - self.reference
 
     @property
+    def size(self) -> float:
+        """Largest difference of levels over the change that calls for a look; 0 without a history."""
+        if self.history is None:
+            return 0.0
+        levels = [level for one in self.history.stretches for level in (one.begin, one.end)]
+        return (max(levels) - min(levels)) / self._limit
+
+    @property
+    def _limit(self) -> float:
+        """Change that calls for a look, in the unit of the quantity."""
+        return max(self.quantity.limit * (abs(self.reference) if self.quantity.relative else 1.0), 1e-300)
+
+    @property
     def need(self) -> float:
         """Change in `AHEAD_DAYS` over the one that calls for a look; 0 without changes, or for the better."""
         if self.history is None:
@@ -75,10 +94,9 @@ class Course:
         serviced = max(self.explained or {}, default=-1) + 1
         if serviced == len(self.history.stretches) - 1 and not self.history.now.slope:
             return 0.0
-        limit = self.quantity.limit * (abs(self.reference) if self.quantity.relative else 1.0)
         change = self.change_ahead
         worse = abs(change) if self.quantity.worse == 0 else self.quantity.worse * change
-        return max(worse, 0.0) / max(limit, 1e-300)
+        return max(worse, 0.0) / self._limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +116,19 @@ class AxisTrend:
         """The course that needs a look first; None where none does."""
         best = max(self.courses, key=lambda one: one.need, default=None)
         return best if best is not None and best.need > 0.0 else None
+
+    @property
+    def shown(self) -> Course | None:
+        """The course that tells most of the axis: the leading one, else the one that changed most."""
+        return self.leading or max(
+            (one for one in self.courses if one.values.size), key=lambda one: one.size, default=None
+        )
+
+    @property
+    def changed(self) -> list[Course]:
+        """Courses with a change that no service explains and that counts, those that changed most first."""
+        found = [one for one in self.courses if one.size >= COUNTS and (one.open_changes or one.slopes)]
+        return sorted(found, key=lambda one: -one.size)
 
     @property
     def need(self) -> float:

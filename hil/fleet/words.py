@@ -2,7 +2,7 @@
 
 from hil.fleet.changes import FEWEST, ChangePoint
 from hil.fleet.quantities import Quantity
-from hil.fleet.trend import AHEAD_DAYS, AxisTrend, Course, date_of
+from hil.fleet.trend import AHEAD_DAYS, COUNTS, AxisTrend, Course, date_of
 from hil.quantities import digits, known_quantity, reading_unit
 
 MONTH_DAYS = 30.0
@@ -62,11 +62,17 @@ def told_changes(course: Course, linear: bool) -> str:
 def why(trend: AxisTrend) -> str:
     """Why an axis needs a look, in one sentence; "steady" if it does not."""
     course = trend.leading
-    opened = [one for one in trend.courses if one.open_changes or (one.history and one.history.now.slope)]
+    opened = trend.changed
     if not any(one.history for one in trend.courses):
         return f"too few recordings to tell changes: {trend.good}, allowed {FEWEST} or more"
-    if course is None or course.history is None:
-        better = ", ".join(one.quantity.label for one in opened)
+    serviced = [(one, at) for one in sorted(trend.courses, key=lambda one: one.size) for at in one.explained or {}]
+    if (course is None or course.history is None) and not opened and serviced:
+        one, at = serviced[-1]
+        service, step = (one.explained or {})[at], one.history.changes[at].step if one.history else 0.0
+        told = f"{one.quantity.label} {amount(step, one, trend.linear)}"
+        return f"steady since it was serviced: {service.what}, {date_of(service.day)} ({told})"
+    if course is None or course.history is None or course.need < COUNTS:
+        better = ", ".join(one.quantity.label for one in opened[:3])
         return f"changes for the better only: {better}" if better else "steady"
     now, linear = course.history.now, trend.linear
     told = f"{course.quantity.label}: {amount(now.end - course.reference, course, linear)} against "
@@ -75,7 +81,8 @@ def why(trend: AxisTrend) -> str:
         told += f", {rate(now.slope, course, linear)}"
     last = course.open_changes[-1:]
     if last:
-        told += f"; {last[0].kind} between {date_of(last[0].earliest)} and {date_of(last[0].latest)}"
+        begun = "stepped" if last[0].kind == "step" else "began"
+        told += f"; {begun} between {date_of(last[0].earliest)} and {date_of(last[0].latest)}"
     others = [one.quantity.label for one in opened if one is not course]
     if others:
         more = f" and {len(others) - 2} more" if len(others) > 2 else ""

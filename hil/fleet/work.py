@@ -120,18 +120,18 @@ def watch_axis(fleet: Store, results: Store, item: Item) -> Row:
     results.write(f"axes/{item.axis}.json", as_json(found).encode())
     if not missing_of("report"):
         results.write(f"axes/{item.axis}.html", axis_page(found, json.loads(item.given)))
-    leading = found.leading or next((one for one in found.courses if one.values.size), None)
+    shown = found.shown
     last = services[-1:]
     return {
         "need": found.need,
         "why": why(found),
-        "curve": str(small_curve(leading)) if leading else "",
+        "curve": str(small_curve(shown)) if shown else "",
         "tests": json.dumps(tests_of(found)),
         "good": found.good,
         "bad": len(found.bad),
         "service": f"{date_of(last[0].day)} {last[0].what}" if last else "",
         "newest": found.newest,
-        "changed": any(one.open_changes for one in found.courses),
+        "changed": bool(found.changed),
     }
 
 

@@ -10,8 +10,7 @@ from hil.fleet.curves import all_courses, legend
 from hil.fleet.quantities import FREQUENCY, NO_RESPONSE
 from hil.fleet.store import Row
 from hil.fleet.trend import AxisTrend, date_of
-from hil.fleet.words import NEED, limit_of, told_changes, value_of, why
-from hil.quantities import digits
+from hil.fleet.words import NEED, limit_of, need_told, told_changes, value_of, why
 from hil.report.page import Page
 
 HEADERS = ("quantity", "vendors' test", "now", "calls for a look", "need", "changes")
@@ -24,7 +23,7 @@ def axis_page(trend: AxisTrend, diagnoses: Sequence[Row]) -> bytes:
     told = f"Needs a look: {why(trend)}." if trend.need >= 1.0 else f"{why(trend)[:1].upper()}{why(trend)[1:]}."
     page = Page(
         trend.axis,
-        f"{trend.good} recordings, {period}; {len(trend.bad)} bad ones · need {digits(trend.need, 2)}",
+        f"{trend.good} recordings, {period}; {len(trend.bad)} bad ones · need {need_told(trend.need)}",
         told,
         trend.need < 1.0,
         NEED,
@@ -42,7 +41,7 @@ def axis_page(trend: AxisTrend, diagnoses: Sequence[Row]) -> bytes:
             one.quantity.test or "–",
             value_of(one, trend.linear),
             limit_of(one.quantity, trend.linear),
-            digits(one.need, 2) if one.history else "–",
+            need_told(one.need),
             told_changes(one, trend.linear),
         )
         for one in sorted(trend.courses, key=lambda one: -one.need)

@@ -53,7 +53,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class ChangePoint:
-    """A change between two recordings: day, its 95 % interval, the step and the change of the slope with errors."""
+    """A change between two recordings: day, its 95 % interval, step and change of the slope with errors."""
 
     day: float
     earliest: float
@@ -62,6 +62,7 @@ class ChangePoint:
     step_error: float
     slope: float
     slope_error: float
+    before: float  # level before it
 
     @property
     def kind(self) -> str:
@@ -180,6 +181,7 @@ def _change(costs: _Costs, day: FloatArray, before: Stretch, after: Stretch) -> 
         math.hypot(before.level_error, after.level_error),
         after.slope - before.slope,
         math.hypot(before.slope_error, after.slope_error),
+        before.end,
     )
 
 

@@ -56,7 +56,10 @@ def all_courses(trend: AxisTrend) -> Drawing:
 
     panels = _panels(trend)
     rows = -(-len(panels) // 2)
-    figure = Drawing(9.6, 0.5 + 1.75 * rows)
+    height = 0.5 + 1.75 * rows
+    figure = Drawing(9.6, height)
+    figure.set_layout_engine(None)  # to compute the margins takes as long as to draw
+    figure.subplots_adjust(0.08, 0.35 / height, 0.985, 1.0 - 0.3 / height, wspace=0.22, hspace=0.32)
     axes = figure.subplots(rows, 2, sharex=True, squeeze=False)
     for axis, courses in zip(axes.flat, panels, strict=False):
         largest = max(float(np.max(np.abs(one.values))) for one in courses)

@@ -27,14 +27,14 @@ PAGES = "1"  # of the trends and their pages; another one makes them anew
 INDEX, CONSTANTS, CONDITION, DIAGNOSES, TRENDS = "index", "constants", "condition", "diagnosed", "trends"
 PAGE = "fleet.html"
 _NUMBER, _TEXT = pa.float64(), pa.string()
-_INDEX = columns(moment=_NUMBER, period_s=_NUMBER, duration_s=_NUMBER, channels=_TEXT, size=pa.int64())
+INDEX_COLUMNS = columns(moment=_NUMBER, period_s=_NUMBER, duration_s=_NUMBER, channels=_TEXT, size=pa.int64())
 _CONSTANTS = columns(inertia=_NUMBER, inertia_error=_NUMBER, period_s=_NUMBER, fitted=_TEXT, bench=_TEXT)
 _OF_QUANTITIES = {
     f"{one.name}{part}": kind
     for one in QUANTITIES
     for part, kind in (("", _NUMBER), ("_error", _NUMBER), ("_reason", _TEXT))
 }
-_CONDITION = columns(moment=_NUMBER, **_OF_QUANTITIES)
+CONDITION_COLUMNS = columns(moment=_NUMBER, **_OF_QUANTITIES)
 _DIAGNOSES = columns(verdict=_TEXT, statement=_TEXT, page=_TEXT)
 _TRENDS = columns(
     need=_NUMBER, why=_TEXT, curve=_TEXT, tests=_TEXT, good=pa.int64(), bad=pa.int64(), service=_TEXT, newest=_TEXT,
@@ -64,7 +64,7 @@ class Fleet:
                 "FLEET/AXIS/2025-03-01.parquet"
             )
         items = [Item(_id(INDEX, _stamp(one), _of(entries, one, MAP)), _axis(one.file), one.file) for one in files]
-        rows = self._run(Stage(INDEX, _INDEX, partial(look_at, self.recordings)), items)
+        rows = self._run(Stage(INDEX, INDEX_COLUMNS, partial(look_at, self.recordings)), items)
         for row in rows:
             row["size"] = entries[row["file"]].size
         return rows
@@ -101,7 +101,7 @@ class Fleet:
                 continue
             given = json.dumps({name: of_axis[name] for name in ("bench", "inertia", "inertia_error", "period_s")})
             items.append(Item(_id(CONDITION, row["id"], of_axis["id"]), row["axis"], row["file"], given))
-        rows = self._run(Stage(CONDITION, _CONDITION, partial(tell_condition, self.recordings)), items)
+        rows = self._run(Stage(CONDITION, CONDITION_COLUMNS, partial(tell_condition, self.recordings)), items)
         moments = {row["file"]: row["moment"] for row in index}
         told = [row | {"moment": moments[row["file"]]} for row in rows]
         refused = [

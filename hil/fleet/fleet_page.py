@@ -9,8 +9,7 @@ from hil.fleet.axis_page import page_content
 from hil.fleet.quantities import BACKLASH, EQUABILITY, FREQUENCY, FRICTION, NO_RESPONSE, QUADRANT, STIFFNESS
 from hil.fleet.store import Row
 from hil.fleet.trend import AHEAD_DAYS
-from hil.fleet.words import NEED
-from hil.quantities import digits
+from hil.fleet.words import NEED, need_told
 from hil.report.page import Page
 
 TESTS = (EQUABILITY, FRICTION, BACKLASH, QUADRANT, STIFFNESS)
@@ -26,8 +25,8 @@ def fleet_page(name: str, rows: Sequence[Row], bad: Sequence[Row]) -> bytes:
     recordings = sum(row["good"] for row in rows)
     page = Page(
         name,
-        f"{len(rows)} axes, {recordings} recordings, {len(bad)} bad ones · axes that change less than calls for a look: "
-        f"{changed}",
+        f"{len(rows)} axes, {recordings} recordings, {len(bad)} bad ones · axes that change, but less than calls "
+        f"for a look: {changed}",
         verdict,
         not need,
         f"{NEED} From 1 on the axis needs a look within {AHEAD_DAYS:g} days.",
@@ -36,7 +35,7 @@ def fleet_page(name: str, rows: Sequence[Row], bad: Sequence[Row]) -> bytes:
     page.table(
         ("axis", "need", "why", "curve of that quantity", "recordings", "bad", "last service"),
         [
-            (_link(row["axis"]), digits(row["need"], 2), row["why"], Markup(row["curve"]), str(row["good"]),
+            (_link(row["axis"]), need_told(row["need"]), row["why"], Markup(row["curve"]), str(row["good"]),
              str(row["bad"] or "–"), row["service"] or "–")
             for row in ordered
         ],
@@ -44,8 +43,8 @@ def fleet_page(name: str, rows: Sequence[Row], bad: Sequence[Row]) -> bytes:
     )  # fmt: skip
     page.heading("Under the names of the vendors' tests")
     page.text(
-        "Level now, and its change against the first level, or against that after the last service. Friction: Coulomb "
-        "friction forward. Backlash: reversal difference of the encoders. A dash: the recordings do not tell "
+        "Level now and, if it changed, how much against the first level or that after the last service. Friction: "
+        "Coulomb friction forward. Backlash: reversal difference of the encoders. A dash: the recordings do not tell "
         f"it; the page of the axis says why. {FREQUENCY.capitalize()}: {NO_RESPONSE}."
     )
     page.table(

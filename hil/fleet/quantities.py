@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 FRICTION, BACKLASH, EQUABILITY = "friction test", "backlash test", "equability test"
-STIFFNESS, QUADRANT = "stiffness test", "quadrant error (circularity test)"
+STIFFNESS, QUADRANT = "stiffness test", "quadrant error"
 FREQUENCY = "frequency response"
 NO_RESPONSE = "a check motion does not excite it: record one with an excitation and call hil frf"
 

@@ -22,11 +22,12 @@ def value_of(course: Course, linear: bool) -> str:
     return "–"
 
 
-def amount(change: float, course: Course, linear: bool) -> str:
-    """A change with its sign: in percent of the reference, or in its unit."""
+def amount(change: float, course: Course, linear: bool, against: float | None = None) -> str:
+    """A change with its sign: in percent of the reference, or of the level `against`, or in its unit."""
     quantity = course.quantity
-    if quantity.relative and course.reference:
-        return f"{100.0 * change / abs(course.reference):+.1f} %"
+    against = course.reference if against is None else against
+    if quantity.relative and against:
+        return f"{100.0 * change / abs(against):+.1f} %"
     factor, unit = reading_unit(quantity.unit_of(linear), change)
     return f"{'+' if change >= 0 else '−'}{digits(abs(change) * factor)} {unit}"
 
@@ -35,7 +36,7 @@ def change_told(change: ChangePoint, course: Course, linear: bool) -> str:
     """A change point: what, how much, when."""
     when = f"between {date_of(change.earliest)} and {date_of(change.latest)}"
     if change.kind == "step":
-        told = f"step of {amount(change.step, course, linear)} {when}"
+        told = f"step of {amount(change.step, course, linear, change.before)} {when}"
     else:
         told = f"{rate(change.slope, course, linear)} more than before, from {when}"
     at = course.history.changes.index(change) if course.history else -1
@@ -54,6 +55,8 @@ def told_changes(course: Course, linear: bool) -> str:
     if found is None:
         return course.reason
     told = [change_told(one, course, linear) for one in found.changes]
+    if found.changes and (slope := found.stretches[0].slope):
+        told.insert(0, f"first {rate(slope, course, linear)}")
     if found.now.slope and not (found.changes and found.changes[-1].kind == "slope" and len(found.changes) == 1):
         told.append(f"{rate(found.now.slope, course, linear)} now")
     return "; ".join(told) or "steady"
@@ -68,8 +71,9 @@ def why(trend: AxisTrend) -> str:
     serviced = [(one, at) for one in sorted(trend.courses, key=lambda one: one.size) for at in one.explained or {}]
     if (course is None or course.history is None) and not opened and serviced:
         one, at = serviced[-1]
-        service, step = (one.explained or {})[at], one.history.changes[at].step if one.history else 0.0
-        told = f"{one.quantity.label} {amount(step, one, trend.linear)}"
+        service = (one.explained or {})[at]
+        change = one.history.changes[at] if one.history else None
+        told = f"{one.quantity.label} {amount(change.step, one, trend.linear, change.before) if change else ''}"
         return f"steady since it was serviced: {service.what}, {date_of(service.day)} ({told})"
     if course is None or course.history is None or course.need < COUNTS:
         better = ", ".join(one.quantity.label for one in opened[:3])
@@ -88,6 +92,11 @@ def why(trend: AxisTrend) -> str:
         more = f" and {len(others) - 2} more" if len(others) > 2 else ""
         told += f". Also: {', '.join(others[:2])}{more}"
     return told
+
+
+def need_told(need: float) -> str:
+    """How much a quantity or an axis needs a look; a dash if not at all."""
+    return digits(need, 2) if need else "–"
 
 
 def limit_of(quantity: Quantity, linear: bool) -> str:
@@ -109,5 +118,5 @@ def tests_of(trend: AxisTrend) -> dict[str, str]:
             continue
         changed = course.history.changes or course.history.now.slope
         change = amount(course.history.now.end - course.reference, course, trend.linear)
-        found[course.quantity.test] = f"{level} ({change if changed else 'steady'})"
+        found[course.quantity.test] = f"{level} ({change})" if changed else level
     return found

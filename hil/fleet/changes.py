@@ -36,6 +36,7 @@ _NEIGHBOURS = 7
 _MAD = 1.4826  # standard deviation over median absolute deviation of normal values
 _WINSORIZED, _KEPT = 2.0, 0.9205  # standard deviations, and the variance of normal values that are clipped there
 _MOST_CORRELATED = 0.9
+_LEAST = 1e-9  # of the largest value: scatter of what is always alike
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,8 @@ def _scatter(values: FloatArray, errors: FloatArray) -> tuple[FloatArray, float]
     variance = max(0.5 * near / (1.0 - correlation), 1e-300)
     beyond = max(variance - own, 0.0)
     total = (errors**2 + beyond) * variance / (own + beyond)
-    return np.maximum(total, 1e-300), (1.0 + correlation) / (1.0 - correlation)
+    least = max(_LEAST * float(np.max(np.abs(values))), 1e-30) ** 2
+    return np.maximum(total, least), (1.0 + correlation) / (1.0 - correlation)
 
 
 def _spread(differences: FloatArray) -> float:

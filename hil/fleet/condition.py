@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError
-from hil.fleet.constants import Constants, own_inertia
+from hil.fleet.constants import Constants
 from hil.fleet.quantities import Told
 from hil.identification.dataset import prepare_dataset
 from hil.identification.derivatives import noise_gains
@@ -34,7 +34,9 @@ _FEWEST = 200  # rows of a regression
 _AFTER_S = 0.15  # after a reversal, in which its error is looked for
 _TURNS = 2.0  # of the screw, which tell its harmonics from the slope
 _HARMONICS = (1, 2, 3)
-_TOLD = 5.0  # standard errors from 0 at which a stiffness, a reciprocal, has one of its own
+_TOLD = (
+    5.0  # standard errors from 0 at which an inertia is told, and a stiffness, a reciprocal, has an error of its own
+)
 
 
 def condition(run: Measured, constants: Constants, set_points: bool = True) -> dict[str, Told]:
@@ -47,11 +49,12 @@ def condition(run: Measured, constants: Constants, set_points: bool = True) -> d
     sliding = motion.sliding(SlowestSliding(_SLIDING * top, _SLIDING * top))
     if np.count_nonzero(sliding) < _FEWEST:
         raise InputError(f"{run.name}: the axis hardly moves, allowed sliding motion; record a check motion")
-    value = own_inertia(run)
-    if value is not None and (told := constants.why_not(value)):
+    inertia = _inertia(motion, sliding)
+    known = inertia.value is not None and inertia.error is not None and inertia.value > _TOLD * inertia.error
+    if known and (told := constants.why_not(inertia.value or 0.0)):
         raise InputError(f"{run.name}: {told}")
     found = _friction(run, motion, sliding, constants)
-    found["inertia"] = Told(reason="no accelerations that tell it") if value is None else _inertia(motion, sliding)
+    found["inertia"] = inertia if known else Told(reason="no accelerations that tell it")
     found["twin_left"] = _twin_left(run, constants, found, SlowestSliding(_SLIDING * top, _SLIDING * top))
     found |= _table(run, motion, sliding, constants)
     if set_points:

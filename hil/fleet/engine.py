@@ -72,7 +72,8 @@ class Engine:
         if todo:
             for row in self._made(stage, todo, len(items)):
                 known[row["id"]] = row
-        rows = [known[item.id] for item in items]
+        empty = dict.fromkeys(stage.schema.names)
+        rows = [empty | known[item.id] for item in items]
         if todo or written or len(rows) != len(done):
             self._gather(stage, rows)
         return rows

@@ -4,6 +4,7 @@ Imports of the twin stand within the functions: the kernels of a worker are comp
 """
 
 import json
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -135,6 +136,7 @@ def watch_axis(fleet: Store, results: Store, item: Item) -> Row:
     }
 
 
+@cache
 def _prepare() -> None:
     from hil.compiled.kernel_cache import provide_kernel_cache
 

@@ -33,7 +33,7 @@ class Workers:
 
     pool: Executor
     count: Callable[[], int]
-    gives_up: type[Exception] | tuple[()] = ()
+    gives_up: type[BaseException] | tuple[()] = ()
 
 
 def side_by_side(work: Callable[[Argument], None], todo: Iterable[Argument], jobs: int) -> Iterator[Argument]:

@@ -1,4 +1,4 @@
-"""Measure `hil fleet` on a fleet of tests/net/ageing_fleet.py:
+"""Measure `hil fleet` on a fleet of tests/support/ageing_fleet.py:
 
 python tests/net/fleet_bars.py run FLEET        # two workers, one killed, the client killed, gone on with; memory
 python tests/net/fleet_bars.py score FLEET TRUTH.json   # after hil fleet trend: change points against the truth
@@ -125,8 +125,8 @@ def score(fleet: Path, truth: Path) -> None:
                 best = min(near, key=lambda one: abs(one["day"] - day))
                 errors.append(best["day"] - day)
                 inside.append(best["earliest"] <= day <= best["latest"])
-                print(f"{axis['axis']} {name} {change['kind']}: {best['day'] - day:+.1f} days, interval "
-                      f"{best['earliest'] - day:+.0f} to {best['latest'] - day:+.0f}, step {best['step']:.4g}")  # fmt: skip
+                early, late = best["earliest"] - day, best["latest"] - day
+                print(f"{axis['axis']} {name} {change['kind']}: {errors[-1]:+.1f} days, {early:+.0f} to {late:+.0f}")
     print(f"{len(errors)} found, {len(missed)} missed {missed}; in the interval {sum(inside)} of {len(inside)}; "
           f"changes on axes that do not age: {len(false)} {false}")  # fmt: skip
 
@@ -150,8 +150,8 @@ def alarms(years: int) -> None:
                 now = bool(looked and (looked.changes or looked.now.slope))
                 found += now and not seen
                 seen = now
-        print(f"{name}: {found} in {years} years of one quantity, {len(QUANTITIES) * found / years:.2f} a year of an axis",
-              flush=True)  # fmt: skip
+        of_axis = len(QUANTITIES) * found / years
+        print(f"{name}: {found} in {years} years of one quantity, {of_axis:.2f} a year of an axis", flush=True)
 
 
 def correlated(rng: np.random.Generator, count: int, by: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Make a fleet of simulated axes that age, and keep the truth aside: python tests/net/ageing_fleet.py FOLDER TRUTH.json
+"""Make a fleet of simulated axes that age: python tests/support/ageing_fleet.py FOLDER TRUTH.json
 
 The axes are those of the simulated reality, whose equations are independent of the twin's; the bench files have masses
 and friction that are wrong by up to a factor of 1.3. From one recording to the next friction scatters. Bad recordings

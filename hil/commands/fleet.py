@@ -82,6 +82,8 @@ def fleet(
 
     if every and what is not FleetStage.DIAGNOSE:
         raise InputError(f"--all: given with {what}, allowed with diagnose")
+    if tls is not None and scheduler is None:
+        raise InputError("--tls: given without --scheduler, allowed with the address of one, tls://HOST:8786")
     recordings = Store(folder)
     place = Store(results) if results else recordings.within(RESULTS)
     compile_kernels()

@@ -106,7 +106,7 @@ def limit_of(quantity: Quantity, linear: bool) -> str:
     return known_quantity(quantity.limit, 0.1 * quantity.limit, quantity.unit_of(linear))
 
 
-def tests_of(trend: AxisTrend) -> dict[str, str]:
+def by_test(trend: AxisTrend) -> dict[str, str]:
     """Level and change under the names of the vendors' tests, by the first quantity of each test that is told."""
     found: dict[str, str] = {}
     for course in trend.courses:

@@ -108,7 +108,7 @@ def watch_axis(fleet: Store, results: Store, item: Item) -> Row:
     from hil.fleet.axis_page import axis_page
     from hil.fleet.curves import small_curve
     from hil.fleet.trend import as_json, date_of, read_services, trend
-    from hil.fleet.words import tests_of, why
+    from hil.fleet.words import by_test, why
 
     index = {row["file"]: row for row in results.rows("index", item.axis)}
     told = [row | {"moment": index[row["file"]]["moment"]} for row in results.rows("condition", item.axis)]
@@ -127,7 +127,7 @@ def watch_axis(fleet: Store, results: Store, item: Item) -> Row:
         "need": found.need,
         "why": why(found),
         "curve": str(small_curve(shown)) if shown else "",
-        "tests": json.dumps(tests_of(found)),
+        "tests": json.dumps(by_test(found)),
         "good": found.good,
         "bad": len(found.bad),
         "service": f"{date_of(last[0].day)} {last[0].what}" if last else "",

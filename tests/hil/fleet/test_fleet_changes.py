@@ -44,18 +44,18 @@ def test_a_slope_begins_and_ends_at_a_service() -> None:
 
 @pytest.mark.parametrize("kind", ["white", "correlated", "outliers"])
 def test_what_only_scatters_has_no_change(kind: str) -> None:
-    """In 100 series of a year at most what the bound allows of one quantity: 100 / 14."""
+    """In 60 series at most what the bound allows of one quantity in as many years: 60 / 14."""
     rng, false = np.random.default_rng(3), 0
-    for _ in range(100):
-        values = rng.standard_normal(120)
+    for _ in range(60):
+        values = rng.standard_normal(90)
         if kind == "correlated":
-            for at in range(1, 120):
+            for at in range(1, 90):
                 values[at] = 0.5 * values[at - 1] + np.sqrt(0.75) * values[at]
         if kind == "outliers":
-            values[rng.integers(120, size=3)] *= 8.0
+            values[rng.integers(90, size=3)] *= 8.0
         found = looked_at(values)
         false += bool(found.changes or found.now.slope)  # type: ignore[attr-defined]
-    assert false <= 100 / QUANTITIES
+    assert false <= 60 / QUANTITIES
 
 
 def test_the_threshold_is_that_of_one_false_change_a_year() -> None:

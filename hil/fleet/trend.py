@@ -50,9 +50,13 @@ class Course:
 
     @property
     def open_changes(self) -> list[ChangePoint]:
-        """Changes that no service explains."""
-        changes = self.history.changes if self.history else ()
-        return [one for at, one in enumerate(changes) if at not in (self.explained or {})]
+        """Changes after the last one that a service explains."""
+        return list(self.history.changes[self._serviced :]) if self.history else []
+
+    @property
+    def _serviced(self) -> int:
+        """Stretches until the last change that a service explains."""
+        return max(self.explained or {}, default=-1) + 1
 
     @property
     def slopes(self) -> bool:
@@ -63,8 +67,7 @@ class Course:
     def reference(self) -> float:
         """Level against which wear counts."""
         assert self.history is not None
-        serviced = max(self.explained or {}, default=-1)
-        return self.history.stretches[serviced + 1].begin
+        return self.history.stretches[self._serviced].begin
 
     @property
     def change_ahead(self) -> float:
@@ -91,8 +94,7 @@ class Course:
         """Change in `AHEAD_DAYS` over the one that calls for a look; 0 without changes, or for the better."""
         if self.history is None:
             return 0.0
-        serviced = max(self.explained or {}, default=-1) + 1
-        if serviced == len(self.history.stretches) - 1 and not self.history.now.slope:
+        if self._serviced == len(self.history.stretches) - 1 and not self.history.now.slope:
             return 0.0
         change = self.change_ahead
         worse = abs(change) if self.quantity.worse == 0 else self.quantity.worse * change

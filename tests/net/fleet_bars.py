@@ -72,16 +72,21 @@ def run(fleet: Path) -> None:
     """Two workers undisturbed, with their memory; one worker; two with both killed."""
     for workers in (2, 1):
         out = fleet / f"_undisturbed_{workers}"
-        begin, seen, process = time.monotonic(), dict[int, list[float]](), client(fleet, out, workers)
+        begin, seen, process = time.monotonic(), dict[int, list[tuple[int, float]]](), client(fleet, out, workers)
         while process.poll() is None:
-            for pid in worker_pids(process.pid):
-                seen.setdefault(pid, []).append(memory_mb(pid))
-            time.sleep(1.0)
-        print(f"{workers} workers: {time.monotonic() - begin:.0f} s, {len(rows(out))} conditions")
-        for values in seen.values():
-            half = len(values) // 2
-            print(f"  memory of a worker [MB]: median of the halves {np.median(values[half // 2 : half]):.0f}, "
-                  f"{np.median(values[half:]):.0f}, largest {max(values):.0f}")  # fmt: skip
+            if done := written(out):
+                for pid in worker_pids(process.pid):
+                    seen.setdefault(pid, []).append((done, memory_mb(pid)))
+            time.sleep(0.5)
+        assert process.returncode == 0
+        total = len(rows(out))
+        print(f"{workers} workers: {time.monotonic() - begin:.0f} s, {total} conditions", flush=True)
+        for pid, values in seen.items():
+            by_third = [
+                [mb for done, mb in values if part * total < 3 * done <= (part + 1) * total] for part in range(3)
+            ]
+            told = ", ".join(f"{np.median(one):.0f}" for one in by_third if one)
+            print(f"  worker {pid}: MB by thirds of the conditions: {told}; largest {max(mb for _, mb in values):.0f}")
     out = fleet / "_disturbed"
     process = client(fleet, out, 2)
     total = len(rows(fleet / "_undisturbed_2"))

@@ -103,7 +103,7 @@ def fleet(
         rows = _do(one, what, every)
     bad = [row for row in rows if row["status"] != "good"]
     for row in bad[:20]:
-        err.print(f"Left out: {row['file'] or row['axis']}: {row['reason']}")
+        err.print(f"Left out: {row['reason'] if row['file'] in row['reason'] else _told(row)}")
     if len(bad) > 20:
         err.print(f"and {len(bad) - 20} more")
     _print(what, rows, one)
@@ -145,6 +145,12 @@ def _print(what: FleetStage, rows: Sequence[Row], fleet: Fleet) -> None:
     else:
         axes = len({row["axis"] for row in good})
         out.print(f"{len(good)} recordings of {axes} axes, {len(rows) - len(good)} bad ones")
+
+
+def _told(row: Row) -> str:
+    """File and reason of a row whose reason names the recording alone, if anything."""
+    name, reason = row["file"] or row["axis"], str(row["reason"])
+    return f"{name}: {reason.removeprefix(f'{Path(name).stem}: ').removeprefix(f'{Path(name).name}: ')}"
 
 
 def _time(seconds: float) -> str:

@@ -26,7 +26,7 @@ _COMPUTING = ("bench", "control", "diagnosis", "fleet", "identification", "impor
 _ENDED = "ended the workers that read it, perhaps for want of memory"
 
 
-class Item(NamedTuple):
+class WorkItem(NamedTuple):
     """What one result is made of: its id, the axis, the file within the fleet, and what the work needs beside it."""
 
     id: str
@@ -42,7 +42,7 @@ class Teller(Protocol):
 
 
 @dataclass(frozen=True)
-class Stage:
+class StageOfWork:
     """A stage: its name, the columns of its rows, and the work for one item, a function that workers can import.
 
     The work returns the columns of its row beside those of the item; what it raises as HilError is the reason of a bad
@@ -51,7 +51,7 @@ class Stage:
 
     name: str
     schema: pa.Schema
-    work: Callable[[Item], Row]
+    work: Callable[[WorkItem], Row]
     alone: bool = False
 
 
@@ -63,7 +63,7 @@ class Engine:
     connect: Callable[[], Workers]
     tell: Teller
 
-    def run(self, stage: Stage, items: Sequence[Item], done: Sequence[Row] = ()) -> list[Row]:
+    def run(self, stage: StageOfWork, items: Sequence[WorkItem], done: Sequence[Row] = ()) -> list[Row]:
         """Return a row for each item, those in `done` as they are; the dataset then has these rows alone."""
         kept = {row["id"]: row for row in done}
         written = {row["id"]: row for row in self.results.parts(stage.name)}
@@ -78,20 +78,20 @@ class Engine:
             self._gather(stage, rows)
         return rows
 
-    def _made(self, stage: Stage, todo: Sequence[Item], of: int) -> Iterator[Row]:
-        begin, made, failed = monotonic(), 0, list[Sequence[Item]]()
+    def _made(self, stage: StageOfWork, todo: Sequence[WorkItem], of: int) -> Iterator[Row]:
+        begin, made, failed = monotonic(), 0, list[Sequence[WorkItem]]()
         work = partial(do, self.results, stage.name, stage.work, _code())
         self.tell(stage.name, of - len(todo), of, 0.0)
         workers = self.connect()
         size = 1 if stage.alone else max(min(len(todo) // (TASKS_A_WORKER * max(workers.count(), 1)), MOST_IN_TASK), 1)
-        tasks: list[Sequence[Item]] = [todo[at : at + size] for at in range(0, len(todo), size)]
+        tasks: list[Sequence[WorkItem]] = [todo[at : at + size] for at in range(0, len(todo), size)]
         for batch, rows in completed(workers, work, tasks, given_up=failed.append):
             made += len(batch)
             left_s = (monotonic() - begin) / made * (len(todo) - made)
             self.tell(stage.name, of - len(todo) + made, of, left_s)
             yield from rows
         single = [[item] for batch in failed for item in batch]
-        lost = list[Sequence[Item]]()
+        lost = list[Sequence[WorkItem]]()
         for _, rows in completed(workers, work, single, given_up=lost.append):
             yield from rows
         for (item,) in lost:
@@ -99,7 +99,7 @@ class Engine:
             self.results.write_part(stage.name, row)
             yield row
 
-    def _gather(self, stage: Stage, rows: Sequence[Row]) -> None:
+    def _gather(self, stage: StageOfWork, rows: Sequence[Row]) -> None:
         """Write the dataset anew, then remove the results of workers: one that is ended between both does it again."""
         by_axis = defaultdict[str, list[Row]](list, {axis: [] for axis in self.results.axes(stage.name)})
         for row in rows:
@@ -110,7 +110,7 @@ class Engine:
 
 
 def do(
-    results: Store, stage: str, work: Callable[[Item], Row], code: dict[str, str], batch: Sequence[Item]
+    results: Store, stage: str, work: Callable[[WorkItem], Row], code: dict[str, str], batch: Sequence[WorkItem]
 ) -> list[Row]:
     """Do the items of a task in this process, a worker's; returns their rows and writes each.
 
@@ -143,7 +143,7 @@ def columns(**more: pa.DataType) -> pa.Schema:
     return pa.schema(list((every | more).items()))
 
 
-def _row(item: Item, status: str, reason: str) -> Row:
+def _row(item: WorkItem, status: str, reason: str) -> Row:
     return {"id": item.id, "axis": item.axis, "file": item.file, "status": status, "reason": reason}
 
 

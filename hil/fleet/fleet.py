@@ -16,10 +16,10 @@ import pyarrow as pa
 from hil.errors import InputError
 from hil.files.optional_library import missing_of
 from hil.fleet.constants import FITTED, LOOKED_AT
-from hil.fleet.engine import BAD, GOOD, Engine, Item, Stage, columns
+from hil.fleet.engine import BAD, GOOD, Engine, StageOfWork, WorkItem, columns
 from hil.fleet.quantities import QUANTITIES
 from hil.fleet.reading import BENCH, MAP, SERVICE, is_recording
-from hil.fleet.store import Entry, Row, Store
+from hil.fleet.store import Row, Store, StoredFile
 from hil.fleet.work import diagnose_one, fit_axis, look_at, tell_condition, watch_axis
 
 METHOD = "1"  # of the quantities; another one makes them anew
@@ -63,8 +63,8 @@ class Fleet:
                 f"{self.recordings.url}: holds no recordings, allowed a folder for each axis with its recordings: "
                 "FLEET/AXIS/2025-03-01.parquet"
             )
-        items = [Item(_id(INDEX, _stamp(one), _of(entries, one, MAP)), _axis(one.file), one.file) for one in files]
-        rows = self._run(Stage(INDEX, INDEX_COLUMNS, partial(look_at, self.recordings)), items)
+        items = [WorkItem(_id(INDEX, _stamp(one), _of(entries, one, MAP)), _axis(one.file), one.file) for one in files]
+        rows = self._run(StageOfWork(INDEX, INDEX_COLUMNS, partial(look_at, self.recordings)), items)
         for row in rows:
             row["size"] = entries[row["file"]].size
         return rows
@@ -82,16 +82,16 @@ class Fleet:
             # until there are enough recordings the values are fitted anew with each one
             few = first if len(rows) < FITTED else []
             given = [_stamp(entries[name]) for name in (f"{axis}/{BENCH}", BENCH, f"{axis}/{MAP}") if name in entries]
-            items.append(Item(_id(CONSTANTS, METHOD, axis, *given, *few), axis, "", json.dumps(first)))
+            items.append(WorkItem(_id(CONSTANTS, METHOD, axis, *given, *few), axis, "", json.dumps(first)))
         done = [row for row in self.results.rows(CONSTANTS) if row["status"] == GOOD]
-        stage = Stage(CONSTANTS, _CONSTANTS, partial(fit_axis, self.recordings), alone=True)
+        stage = StageOfWork(CONSTANTS, _CONSTANTS, partial(fit_axis, self.recordings), alone=True)
         return {row["axis"]: row for row in self.engine.run(stage, items, done)}
 
     def compare(self) -> list[Row]:
         """Tell the condition by every recording that has none yet; returns a row for each there is."""
         index = self.index()
         constants = self.constants(index)
-        items, bad = list[Item](), dict[str, str]()
+        items, bad = list[WorkItem](), dict[str, str]()
         for row in index:
             if row["status"] != GOOD:
                 continue
@@ -100,8 +100,8 @@ class Fleet:
                 bad[row["id"]] = of_axis["reason"] if of_axis else "lies in no folder of an axis: FLEET/AXIS/FILE"
                 continue
             given = json.dumps({name: of_axis[name] for name in ("bench", "inertia", "inertia_error", "period_s")})
-            items.append(Item(_id(CONDITION, row["id"], of_axis["id"]), row["axis"], row["file"], given))
-        rows = self._run(Stage(CONDITION, CONDITION_COLUMNS, partial(tell_condition, self.recordings)), items)
+            items.append(WorkItem(_id(CONDITION, row["id"], of_axis["id"]), row["axis"], row["file"], given))
+        rows = self._run(StageOfWork(CONDITION, CONDITION_COLUMNS, partial(tell_condition, self.recordings)), items)
         moments = {row["file"]: row["moment"] for row in index}
         told = [row | {"moment": moments[row["file"]]} for row in rows]
         refused = [
@@ -125,8 +125,8 @@ class Fleet:
             if (row := conditions.get(file)) is None:
                 continue
             given = json.dumps({"bench": constants[row["axis"]]["bench"]})
-            items.append(Item(_id(DIAGNOSES, row["id"]), row["axis"], file, given))
-        stage = Stage(DIAGNOSES, _DIAGNOSES, partial(diagnose_one, self.recordings, self.results), alone=True)
+            items.append(WorkItem(_id(DIAGNOSES, row["id"]), row["axis"], file, given))
+        stage = StageOfWork(DIAGNOSES, _DIAGNOSES, partial(diagnose_one, self.recordings, self.results), alone=True)
         return self._run(stage, items)
 
     def trend(self) -> list[Row]:
@@ -146,11 +146,11 @@ class Fleet:
         for axis, ids in by_axis.items():
             given = json.dumps(diagnosed[axis])
             items.append(
-                Item(
+                WorkItem(
                     _id(TRENDS, PAGES, axis, *sorted(ids), stamps.get(f"{axis}/{SERVICE}", ""), given), axis, "", given
                 )
             )
-        rows = self._run(Stage(TRENDS, _TRENDS, partial(watch_axis, self.recordings, self.results)), items)
+        rows = self._run(StageOfWork(TRENDS, _TRENDS, partial(watch_axis, self.recordings, self.results)), items)
         if not missing_of("report"):
             from hil.fleet.fleet_page import fleet_page
 
@@ -160,7 +160,7 @@ class Fleet:
             self.results.write(PAGE, fleet_page(name, told, bad))
         return rows
 
-    def _run(self, stage: Stage, items: Sequence[Item]) -> list[Row]:
+    def _run(self, stage: StageOfWork, items: Sequence[WorkItem]) -> list[Row]:
         return self.engine.run(stage, items, self.results.rows(stage.name))
 
 
@@ -169,11 +169,11 @@ def _axis(file: str) -> str:
     return first if rest else ""
 
 
-def _stamp(entry: Entry) -> str:
+def _stamp(entry: StoredFile) -> str:
     return f"{entry.file}\0{entry.size}\0{entry.stamp}"
 
 
-def _of(entries: dict[str, Entry], one: Entry, name: str) -> str:
+def _of(entries: dict[str, StoredFile], one: StoredFile, name: str) -> str:
     """Stamp of a file of the axis of an entry; empty without one."""
     found = entries.get(f"{_axis(one.file)}/{name}")
     return _stamp(found) if found else ""

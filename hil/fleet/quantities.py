@@ -10,7 +10,7 @@ NO_RESPONSE = "a check motion does not excite it: record one with an excitation 
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ConditionQuantity:
     """A quantity of the condition.
 
     `worse`: 1 if more of it is worse, -1 if less is, 0 if any change is. `limit`: change that calls for a look, in the
@@ -33,21 +33,21 @@ class Quantity:
 
 _UNITS = {"torque": ("N m", "N"), "viscous": ("N m s/rad", "N s/m"), "inertia": ("kg m^2", "kg")}
 
-QUANTITIES: Sequence[Quantity] = (
-    Quantity("coulomb_forward", "Coulomb friction, forward", FRICTION, "torque", 1, 0.3, relative=True),
-    Quantity("coulomb_back", "Coulomb friction, back", FRICTION, "torque", 1, 0.3, relative=True),
-    Quantity("viscous_forward", "viscous friction, forward", FRICTION, "viscous", 1, 0.5, relative=True),
-    Quantity("viscous_back", "viscous friction, back", FRICTION, "viscous", 1, 0.5, relative=True),
-    Quantity("ripple", "torque unlike the friction line (rms)", EQUABILITY, "torque", 1, 1.0, relative=True),
-    Quantity("reversal", "reversal difference of the encoders", BACKLASH, "m", 1, 10e-6),
-    Quantity("quadrant", "peak of the following error after reversals", QUADRANT, "m", 1, 0.5, relative=True),
-    Quantity("stiffness", "stiffness of the transmission", STIFFNESS, "N/m", -1, 0.2, relative=True),
-    Quantity("lead_error", "lead error, once per turn", "", "m", 1, 5e-6),
-    Quantity("lead_slope", "lead against its nominal value", "", "m/m", 0, 50e-6),
-    Quantity("table_delay", "table encoder later than the motor's", "", "s", 0, 100e-6),
-    Quantity("torque_delay", "torque later than the motion", "", "s", 0, 500e-6),
-    Quantity("inertia", "inertia that moves", "", "inertia", 0, 0.1, relative=True),
-    Quantity("twin_left", "torque that the twin leaves", "", "1", 1, 0.1),
+QUANTITIES: Sequence[ConditionQuantity] = (
+    ConditionQuantity("coulomb_forward", "Coulomb friction, forward", FRICTION, "torque", 1, 0.3, relative=True),
+    ConditionQuantity("coulomb_back", "Coulomb friction, back", FRICTION, "torque", 1, 0.3, relative=True),
+    ConditionQuantity("viscous_forward", "viscous friction, forward", FRICTION, "viscous", 1, 0.5, relative=True),
+    ConditionQuantity("viscous_back", "viscous friction, back", FRICTION, "viscous", 1, 0.5, relative=True),
+    ConditionQuantity("ripple", "torque unlike the friction line (rms)", EQUABILITY, "torque", 1, 1.0, relative=True),
+    ConditionQuantity("reversal", "reversal difference of the encoders", BACKLASH, "m", 1, 10e-6),
+    ConditionQuantity("quadrant", "peak of the following error after reversals", QUADRANT, "m", 1, 0.5, relative=True),
+    ConditionQuantity("stiffness", "stiffness of the transmission", STIFFNESS, "N/m", -1, 0.2, relative=True),
+    ConditionQuantity("lead_error", "lead error, once per turn", "", "m", 1, 5e-6),
+    ConditionQuantity("lead_slope", "lead against its nominal value", "", "m/m", 0, 50e-6),
+    ConditionQuantity("table_delay", "table encoder later than the motor's", "", "s", 0, 100e-6),
+    ConditionQuantity("torque_delay", "torque later than the motion", "", "s", 0, 500e-6),
+    ConditionQuantity("inertia", "inertia that moves", "", "inertia", 0, 0.1, relative=True),
+    ConditionQuantity("twin_left", "torque that the twin leaves", "", "1", 1, 0.1),
 )
 BY_NAME = {one.name: one for one in QUANTITIES}
 

@@ -27,7 +27,7 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Entry:
+class StoredFile:
     """A file of a fleet: path within it, size, and a stamp that differs when it was changed."""
 
     file: str
@@ -59,7 +59,7 @@ class Store:
         """A folder within this one."""
         return Store(f"{self.url.rstrip('/')}/{folder}")
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[StoredFile]:
         """All files, by name; none where the folder is not there. Hidden ones and those in folders `_...` are not."""
         system, root = self._place
         found = []
@@ -68,7 +68,7 @@ class Store:
             if any(part.startswith((".", "_")) for part in PurePosixPath(name).parts):
                 continue
             stamps = (info.get(key) for key in ("ETag", "etag", "mtime", "LastModified", "last_modified", "created"))
-            found.append(Entry(name, int(info.get("size") or 0), str(next((one for one in stamps if one), ""))))
+            found.append(StoredFile(name, int(info.get("size") or 0), str(next((one for one in stamps if one), ""))))
         return sorted(found, key=lambda one: one.file)
 
     def names(self, folder: str) -> list[str]:

@@ -17,7 +17,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.fleet.changes import FEWEST, ChangePoint, History, history
-from hil.fleet.quantities import QUANTITIES, Quantity
+from hil.fleet.quantities import QUANTITIES, ConditionQuantity
 from hil.fleet.store import Row
 
 DAY_S = 86400.0
@@ -40,7 +40,7 @@ class Course:
     `explained` are the changes that a service explains, by their index. `reason` says why there is no history.
     """
 
-    quantity: Quantity
+    quantity: ConditionQuantity
     day: FloatArray
     values: FloatArray
     errors: FloatArray

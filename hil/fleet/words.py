@@ -1,7 +1,7 @@
 """The trend of an axis in words: values, changes, and why it needs a look."""
 
 from hil.fleet.changes import FEWEST, ChangePoint
-from hil.fleet.quantities import Quantity
+from hil.fleet.quantities import ConditionQuantity
 from hil.fleet.trend import AHEAD_DAYS, COUNTS, AxisTrend, Course, date_of
 from hil.quantities import digits, known_quantity, reading_unit
 
@@ -99,7 +99,7 @@ def need_told(need: float) -> str:
     return digits(need, 2) if need else "–"
 
 
-def limit_of(quantity: Quantity, linear: bool) -> str:
+def limit_of(quantity: ConditionQuantity, linear: bool) -> str:
     """The change that calls for a look."""
     if quantity.relative:
         return f"{100.0 * quantity.limit:g} %"

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from hil.errors import InputError
-from hil.fleet.engine import Item
+from hil.fleet.engine import WorkItem
 from hil.fleet.reading import BENCH, MAP, SERVICE, moment_of, read
 from hil.fleet.store import Row, Store
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FLEET_BENCH = BENCH  # beside the folders of the axes: one bench for all of them
 
 
-def look_at(fleet: Store, item: Item) -> Row:
+def look_at(fleet: Store, item: WorkItem) -> Row:
     """Read a recording: its moment, period, duration and channels."""
     recording = _read(fleet, item)
     moment = moment_of(recording, item.file)
@@ -33,7 +33,7 @@ def look_at(fleet: Store, item: Item) -> Row:
     }
 
 
-def fit_axis(fleet: Store, item: Item) -> Row:
+def fit_axis(fleet: Store, item: WorkItem) -> Row:
     """Fit what is constant of an axis to the files in `item.given`."""
     _prepare()
     from hil.fleet.constants import fit_constants
@@ -60,7 +60,7 @@ def fit_axis(fleet: Store, item: Item) -> Row:
     }
 
 
-def tell_condition(fleet: Store, item: Item) -> Row:
+def tell_condition(fleet: Store, item: WorkItem) -> Row:
     """Tell the condition of the axis by one recording; `item.given` are the constants of the axis."""
     _prepare()
     from hil.bench.bench_file import Bench
@@ -85,7 +85,7 @@ def tell_condition(fleet: Store, item: Item) -> Row:
     return row
 
 
-def diagnose_one(fleet: Store, results: Store, item: Item) -> Row:
+def diagnose_one(fleet: Store, results: Store, item: WorkItem) -> Row:
     """Diagnose a recording with the bench of its axis in full, and write its report."""
     _prepare()
     from hil.bench.bench_file import Bench
@@ -101,7 +101,7 @@ def diagnose_one(fleet: Store, results: Store, item: Item) -> Row:
     return {"verdict": str(found.result.verdict), "statement": found.result.statement, "page": f"{place}/report.html"}
 
 
-def watch_axis(fleet: Store, results: Store, item: Item) -> Row:
+def watch_axis(fleet: Store, results: Store, item: WorkItem) -> Row:
     """Find the trend of an axis by the conditions in the dataset, and write its page and its JSON."""
     from hil.channels import AxisKind
     from hil.files.optional_library import missing_of
@@ -143,7 +143,7 @@ def _prepare() -> None:
     provide_kernel_cache()
 
 
-def _read(fleet: Store, item: Item) -> "Recording":
+def _read(fleet: Store, item: WorkItem) -> "Recording":
     with fleet.fetched([item.file, f"{item.axis}/{MAP}"]) as (path, map_path):
         return read(path, map_path)
 

@@ -23,6 +23,7 @@ from processes import wait_for
 from hil.fleet.changes import FEWEST, history
 from hil.fleet.quantities import QUANTITIES
 from hil.fleet.store import Store
+from hil.fleet.trend import date_of
 
 ROOT = Path(__file__).parents[2]
 BEGIN_DAY = 20089.25  # of ageing_fleet.BEGIN, since 1970
@@ -129,9 +130,9 @@ def score(fleet: Path, truth: Path) -> None:
                     continue
                 best = min(near, key=lambda one: abs(one["day"] - day))
                 errors.append(best["day"] - day)
-                inside.append(best["earliest"] <= day <= best["latest"])
-                early, late = best["earliest"] - day, best["latest"] - day
-                print(f"{axis['axis']} {name} {change['kind']}: {errors[-1]:+.1f} days, {early:+.0f} to {late:+.0f}")
+                inside.append(best["earliest"] <= date_of(day) <= best["latest"])
+                when = f"{best['earliest']} to {best['latest']}, true {date_of(day)}"
+                print(f"{axis['axis']} {name} {change['kind']}: {errors[-1]:+.1f} days, {when}")
     print(f"{len(errors)} found, {len(missed)} missed {missed}; in the interval {sum(inside)} of {len(inside)}; "
           f"changes on axes that do not age: {len(false)} {false}")  # fmt: skip
 

@@ -10,7 +10,7 @@ import fsspec
 import pytest
 
 from hil.errors import HilError, InputError
-from hil.fleet.engine import Engine, Item, Stage, columns
+from hil.fleet.engine import Engine, StageOfWork, WorkItem, columns
 from hil.fleet.fleet import CONDITION, Fleet
 from hil.fleet.reading import moment_of
 from hil.fleet.store import RESULTS, Row, Store
@@ -41,7 +41,7 @@ def fleet_at(url: str) -> tuple[Fleet, InProcess]:
     return Fleet(store, Engine(store.within(RESULTS), workers, lambda *told: None)), workers
 
 
-def note(item: Item) -> Row:
+def note(item: WorkItem) -> Row:
     AT_WORK.append(item.file)
     if item.file == "heavy":
         raise Gone
@@ -104,9 +104,9 @@ def test_a_recording_that_ends_its_workers_is_told_and_the_others_are_done(tmp_p
     AT_WORK.clear()
     engine = Engine(Store(str(tmp_path)), InProcess(), lambda *told: None)
     items = [
-        Item(f"id-{at}", "axis", "heavy" if at == 7 else "broken" if at == 9 else f"file-{at}") for at in range(40)
+        WorkItem(f"id-{at}", "axis", "heavy" if at == 7 else "broken" if at == 9 else f"file-{at}") for at in range(40)
     ]
-    rows = engine.run(Stage("tried", columns(), note), items)
+    rows = engine.run(StageOfWork("tried", columns(), note), items)
     assert [row["id"] for row in rows] == [item.id for item in items]
     reasons = {row["file"]: row["reason"] for row in rows if row["status"] == "bad"}
     assert reasons == {
@@ -120,10 +120,10 @@ def test_a_recording_that_ends_its_workers_is_told_and_the_others_are_done(tmp_p
 def test_results_of_a_client_that_was_killed_are_taken(tmp_path: Path) -> None:
     AT_WORK.clear()
     store = Store(str(tmp_path))
-    items = [Item(f"id-{at}", "axis", f"file-{at}") for at in range(4)]
+    items = [WorkItem(f"id-{at}", "axis", f"file-{at}") for at in range(4)]
     for item in items[:3]:
         store.write_part("tried", {**item._asdict(), "status": "good", "reason": "kept"})
-    rows = Engine(store, InProcess(), lambda *told: None).run(Stage("tried", columns(), note), items)
+    rows = Engine(store, InProcess(), lambda *told: None).run(StageOfWork("tried", columns(), note), items)
     assert AT_WORK == ["file-3"]
     assert [row["reason"] for row in rows] == ["kept", "kept", "kept", ""]
 

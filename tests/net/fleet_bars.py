@@ -56,6 +56,22 @@ def memory_mb(pid: int) -> float:
         return 0.0
 
 
+def processor_s(pid: int) -> float:
+    """Processor time of a process."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    except (FileNotFoundError, ProcessLookupError):
+        return 0.0
+
+
+def _rate(seen: list[tuple[float, int]]) -> float:
+    """Results for each second from the first tenth to the last."""
+    most = seen[-1][1]
+    inner = [one for one in seen if 0.1 * most < one[1] < 0.95 * most]
+    return (inner[-1][1] - inner[0][1]) / (inner[-1][0] - inner[0][0])
+
+
 def written(out: Path) -> int:
     """Conditions that workers have written."""
     return len(list((out / "parts" / "condition").glob("*.json")))
@@ -74,14 +90,19 @@ def run(fleet: Path) -> None:
     for workers in (2, 1):
         out = fleet / f"_undisturbed_{workers}"
         begin, seen, process = time.monotonic(), dict[int, list[tuple[int, float]]](), client(fleet, out, workers)
+        times, work = list[tuple[float, int]](), list[tuple[float, int]]()
         while process.poll() is None:
             if done := written(out):
-                for pid in worker_pids(process.pid):
+                pids = worker_pids(process.pid)
+                for pid in pids:
                     seen.setdefault(pid, []).append((done, memory_mb(pid)))
+                times.append((time.monotonic(), done))
+                work.append((sum(map(processor_s, pids)), done))
             time.sleep(0.5)
         assert process.returncode == 0
         total = len(rows(out))
-        print(f"{workers} workers: {time.monotonic() - begin:.0f} s, {total} conditions", flush=True)
+        print(f"{workers} workers: {time.monotonic() - begin:.0f} s, {total} conditions; {_rate(times):.1f} a second, "
+              f"{1e3 * _rate(work):.0f} for 1000 s of the workers' processor time", flush=True)  # fmt: skip
         for pid, values in seen.items():
             by_third = [
                 [mb for done, mb in values if part * total < 3 * done <= (part + 1) * total] for part in range(3)

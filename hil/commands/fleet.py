@@ -144,7 +144,7 @@ def _print(what: FleetStage, rows: Sequence[Row], fleet: Fleet) -> None:
         out.print("\nhil fleet trend links them from the pages of their axes.")
     else:
         axes = len({row["axis"] for row in good})
-        out.print(f"{len(good)} recordings of {axes} axes, {len(rows) - len(good)} bad ones")
+        out.print(f"good recordings: {len(good)} of {axes} axes; bad: {len(rows) - len(good)}")
 
 
 def _told(row: Row) -> str:

@@ -23,7 +23,7 @@ def axis_page(trend: AxisTrend, diagnoses: Sequence[Row]) -> bytes:
     told = f"Needs a look: {why(trend)}." if trend.need >= 1.0 else f"{why(trend)[:1].upper()}{why(trend)[1:]}."
     page = Page(
         trend.axis,
-        f"{trend.good} recordings, {period}; {len(trend.bad)} bad ones · need {need_told(trend.need)}",
+        f"{trend.good} good recordings, {period}; {len(trend.bad)} bad · need {need_told(trend.need)}",
         told,
         trend.need < 1.0,
         NEED,

@@ -35,7 +35,7 @@ _CLIPPED = 3.0  # standard deviations from the median of its neighbours, beyond 
 _NEIGHBOURS = 7
 _MAD = 1.4826  # standard deviation over median absolute deviation of normal values
 _WINSORIZED, _KEPT = 2.0, 0.9205  # standard deviations, and the variance of normal values that are clipped there
-_MOST_CORRELATED = 0.9
+_MOST_CORRELATED = 0.7  # from one recording to the next: more is a wander, which is a change
 _LEAST = 1e-9  # of the largest value: scatter of what is always alike
 
 
@@ -191,11 +191,13 @@ def _scatter(values: FloatArray, errors: FloatArray) -> tuple[FloatArray, float]
 
     Part of a standard error may be alike in all recordings and scatter less: then they only weigh.
     """
-    near, far = (_spread(values[lag:] - values[:-lag]) for lag in (1, 2))
+    weight = np.maximum(errors, 1e-3 * float(np.max(errors, initial=0.0))) / (float(np.median(errors)) or 1.0)
+    weight = weight if np.all(weight > 0.0) else np.ones_like(values)  # noisier recordings count as such
+    near, far = (_spread((values[lag:] - values[:-lag]) / np.hypot(weight[lag:], weight[:-lag])) for lag in (1, 2))
     own = float(np.median(errors**2))
     by_chance = 0.5 / math.sqrt(values.size)
     correlation = float(np.clip(far / near - 1.0 - by_chance, 0.0, _MOST_CORRELATED)) if near > 0.0 else 0.0
-    variance = max(0.5 * near / (1.0 - correlation), 1e-300)
+    variance = max(near / (1.0 - correlation), 1e-300)
     beyond = max(variance - own, 0.0)
     total = (errors**2 + beyond) * variance / (own + beyond)
     least = max(_LEAST * float(np.max(np.abs(values))), 1e-30) ** 2

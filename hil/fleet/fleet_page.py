@@ -25,7 +25,7 @@ def fleet_page(name: str, rows: Sequence[Row], bad: Sequence[Row]) -> bytes:
     recordings = sum(row["good"] for row in rows)
     page = Page(
         name,
-        f"{len(rows)} axes, {recordings} recordings, {len(bad)} bad ones · axes that change, but less than calls "
+        f"{len(rows)} axes, {recordings} good recordings, {len(bad)} bad · axes that change, but less than calls "
         f"for a look: {changed}",
         verdict,
         not need,

@@ -24,3 +24,9 @@ def with_bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def fleet(with_bad: Path, tmp_path: Path) -> Path:
     """A copy without the bad ones."""
     return Path(shutil.copytree(with_bad, tmp_path / "fleet", ignore=shutil.ignore_patterns(BAD)))
+
+
+@pytest.fixture(autouse=True)
+def threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker takes one thread, by the environment of its process; here that of the tests stays as it was."""
+    monkeypatch.setenv("HIL_THREADS", "1")

@@ -23,6 +23,7 @@ from hil.commands.diagnose import diagnose
 from hil.commands.doctor import doctor
 from hil.commands.explain import explain
 from hil.commands.export import export
+from hil.commands.fleet import fleet
 from hil.commands.frf import frf
 from hil.commands.friction import friction
 from hil.commands.guide import guide
@@ -96,6 +97,7 @@ COMMANDS: tuple[tuple[str, Callable[..., Any]], ...] = (
     ("diagnose", diagnose),
     ("compensate", compensate),
     ("investigate", investigate),
+    ("fleet", fleet),
     ("friction", friction),
     ("frf", frf),
     ("iso230", iso230),

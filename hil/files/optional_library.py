@@ -11,6 +11,7 @@ from hil.errors import InputError
 EXTRAS = {
     "report": ("matplotlib", "bokeh"),
     "scope": ("starlette", "uvicorn", "websockets"),
+    "fleet": ("distributed", "fsspec"),
 }
 _OF_LINUX = ("fcntl", "resource", "tty")  # modules of Python that Windows does not have
 

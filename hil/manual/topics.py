@@ -17,6 +17,7 @@ GUIDE = (
     "profile",
     "frequency-response",
     "iso-230",
+    "fleet",
     "drive",
     "real-time",
     "python",

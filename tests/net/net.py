@@ -35,7 +35,7 @@ from hil.importing.by_map import import_recording
 from hil.recording.recording import Recording, read_recording, write_parquet
 from hil.validation.proof.draw.expected import same_law
 from hil.validation.proof.draw.generator import draw
-from hil.validation.proof.worker_pool import side_by_side
+from hil.workers.pool import side_by_side
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "answers.json"

@@ -22,11 +22,12 @@ from typing import Any
 from hil.errors import HilError, InputError
 from hil.files.output import write_json
 from hil.report.console import Progress
-from hil.validation.proof.code import code_sha256, versions
+from hil.validation.proof.code import code_sha256
 from hil.validation.proof.draw.generator import Truth, draw, write
 from hil.validation.proof.draw.mujoco_plant import draw_mujoco
 from hil.validation.proof.draw.plan import Planned
-from hil.validation.proof.worker_pool import side_by_side
+from hil.workers.code import versions
+from hil.workers.pool import side_by_side
 
 CASES, SEALED, SEAL = "cases", "sealed", "seal.json"
 _TRUTHS = f"{SEALED}/truths.json"

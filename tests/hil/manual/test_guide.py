@@ -16,7 +16,8 @@ from guide_pages import NEEDS_HARDWARE, ROOT, Step, prepared, run, steps
 from hil.manual.topics import FOLDER, GUIDE, TOPICS, for_terminal, guide_page, title
 
 SLOW = re.compile(
-    r"hil (demo|explain|diagnose|investigate|compare|identify)\b|--seconds|hil\.diagnose|profiles/(positioning|circle)"
+    r"hil (demo|explain|diagnose|investigate|compare|identify|fleet)\b|--seconds|hil\.diagnose"
+    r"|profiles/(positioning|circle)"
 )
 
 

@@ -25,8 +25,11 @@ import typer
 from hil.errors import HilError
 from hil.files.output import write_json, write_text
 from hil.motion.profile import write_profile
-from hil.validation.proof.code import code_sha256, versions
-from hil.validation.proof.worker_pool import cases_in, cluster, completed, local
+from hil.validation.proof.case_folder import cases_in
+from hil.validation.proof.code import code_sha256
+from hil.workers.cluster import cluster
+from hil.workers.code import versions
+from hil.workers.pool import completed, local
 
 DIAGNOSIS, ERROR = "diagnosis.json", "error.json"
 _ONE_AT_A_TIME = Lock()  # a diagnosis uses all threads that its process has

@@ -19,7 +19,7 @@ from hil.recording.recording import write_parquet
 from hil.report.console import Progress
 from hil.validation.proof.draw.generator import Truth, draw, rerun
 from hil.validation.proof.seal import CASES
-from hil.validation.proof.worker_pool import side_by_side
+from hil.workers.pool import side_by_side
 
 AGAIN = "again"
 _NEW = "train_3"

@@ -14,8 +14,9 @@ import typer
 
 from hil.errors import HilError
 from hil.validation.proof.answer.blind import answered
+from hil.validation.proof.case_folder import cases_in
 from hil.validation.proof.peers import METHODS, SLOW, answer_case
-from hil.validation.proof.worker_pool import cases_in, side_by_side
+from hil.workers.pool import side_by_side
 
 Name = StrEnum("Name", {name: name for name in METHODS})  # type: ignore[misc]   # choices of the command line
 _QUICK = [Name(name) for name in METHODS if name not in SLOW]

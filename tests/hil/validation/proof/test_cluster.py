@@ -20,13 +20,14 @@ from hil.validation.proof.answer.blind import DIAGNOSIS, CaseFiles, diagnose_fil
 from hil.validation.proof.draw.plan import Planned
 from hil.validation.proof.run import prove
 from hil.validation.proof.seal import CASES, draw_cases, seal
-from hil.validation.proof.worker_pool import cluster
+from hil.workers.cluster import cluster
 
 # Waits for a case that would take longer than anybody waits.
 WAITING = """
 import sys, time
 from hil.errors import HilError
-from hil.validation.proof.worker_pool import cluster, completed
+from hil.workers.cluster import cluster
+from hil.workers.pool import completed
 
 try:
     with cluster(sys.argv[1]) as workers:

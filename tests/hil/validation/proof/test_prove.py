@@ -214,7 +214,7 @@ def test_the_blind_process_imports_nothing_that_knows(tmp_path: Path) -> None:
     assert {name for name in loaded if name.startswith("hil.validation.proof.")} == {
         "hil.validation.proof.answer",
         "hil.validation.proof.answer.blind",
-        "hil.validation.proof.worker_pool",
+        "hil.validation.proof.case_folder",
         "hil.validation.proof.code",
     }
     assert not {

@@ -12,13 +12,13 @@ import pytest
 from processes import DEADLINE_S, is_over, wait_for
 
 from hil.errors import InputError
-from hil.validation.proof.worker_pool import cases_in
+from hil.validation.proof.case_folder import cases_in
 
 # Two cases, each of which says which process works at it and would take longer than anybody waits.
 WORK = """
 import os, time
 from pathlib import Path
-from hil.validation.proof.worker_pool import side_by_side
+from hil.workers.pool import side_by_side
 
 def work(place):
     (place / "part").write_text(str(os.getpid()))
@@ -31,7 +31,7 @@ if __name__ == "__main__":
 
 THREADS = """
 import os
-from hil.validation.proof.worker_pool import completed, local
+from hil.workers.pool import completed, local
 
 def threads(_):
     from hil.identification.parallel import POOL, THREADS

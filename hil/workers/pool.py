@@ -1,26 +1,24 @@
-"""Process cases in parallel: in processes that keep to their share of the cores, or on a dask.distributed cluster."""
+"""Do tasks in parallel, in processes that keep to their share of the cores."""
 
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from math import inf
 from multiprocessing import get_context, parent_process
-from pathlib import Path
 from threading import Thread
 from time import monotonic
 from typing import TYPE_CHECKING, TypeVar
 
-from hil.errors import HilError, InputError
+from hil.errors import HilError
 
 if TYPE_CHECKING:
     from multiprocessing.queues import Queue
 
-CONNECT_S = 10.0  # within which a scheduler answers over a network
 JOIN_S = 5.0  # after which workers that have joined get their cases: short beside a diagnosis
 Argument = TypeVar("Argument")
 Result = TypeVar("Result")
@@ -28,10 +26,14 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Workers:
-    """Processes that do tasks: `count` tells how many there are now."""
+    """Processes that do tasks: `count` tells how many there are now.
+
+    `gives_up`: what a task raises that ended several of them.
+    """
 
     pool: Executor
     count: Callable[[], int]
+    gives_up: type[BaseException] | tuple[()] = ()
 
 
 def side_by_side(work: Callable[[Argument], None], todo: Iterable[Argument], jobs: int) -> Iterator[Argument]:
@@ -62,45 +64,17 @@ def local(jobs: int) -> Iterator[Workers]:
         ) from None
 
 
-@contextmanager
-def cluster(address: str) -> Iterator[Workers]:
-    """Connect to the scheduler of a dask.distributed cluster, whose workers may come and go.
-
-    A case whose worker is lost goes to another one. Raises InputError if no scheduler answers, HilError if
-    dask.distributed is not installed, if the scheduler is lost, if a worker has no room for a case, or if a case ended
-    several workers.
-    """
-    try:
-        from distributed import Client, KilledWorker
-    except ImportError:
-        raise HilError(
-            "--scheduler: dask.distributed is not installed; pip install 'hil-servo[cluster]', or give --workers"
-        ) from None
-    try:
-        client = Client(address, timeout=CONNECT_S)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"--scheduler: given {address}, allowed the address that dask scheduler prints, as tcp://10.0.0.1:8786; "
-            f"no scheduler answers there ({error})"
-        ) from None
-    with client:
-        try:
-            yield Workers(client.get_executor(pure=False), lambda: len(client.nthreads()))
-        except KilledWorker as error:
-            raise HilError(f"a case ended several workers, perhaps for want of memory: {error}") from None
-        except (OSError, CancelledError) as error:
-            raise HilError(
-                f"{address}: the scheduler is lost, or a worker cannot write ({type(error).__name__}: {error}); "
-                "mend that and run the same again to go on"
-            ) from None
-
-
 def completed(
-    workers: Workers, work: Callable[[Argument], Result], todo: Iterable[Argument], hours: float = inf
+    workers: Workers,
+    work: Callable[[Argument], Result],
+    todo: Iterable[Argument],
+    hours: float = inf,
+    given_up: Callable[[Argument], None] | None = None,
 ) -> Iterator[tuple[Argument, Result]]:
     """Call `work` for each argument, one per worker at once, none begun after `hours`; yields results as they come.
 
-    An argument is taken from `todo` when a worker is free for it.
+    An argument is taken from `todo` when a worker is free for it. With `given_up`, one that ended several workers is
+    told to it, and the others go on.
     """
     end_s = monotonic() + 3600.0 * hours
     waiting, running = iter(todo), dict[Future[Result], Argument]()
@@ -112,25 +86,19 @@ def completed(
             if not running:
                 break
             for done in wait(running, JOIN_S, return_when=FIRST_COMPLETED).done:
-                yield running.pop(done), done.result()
+                argument = running.pop(done)
+                try:
+                    result = done.result()
+                except workers.gives_up:
+                    if given_up is None:
+                        raise
+                    given_up(argument)
+                else:
+                    yield argument, result
     except BaseException:  # stopped, or the generator is closed: no further case begins
         for case in running:
             case.cancel()
         raise
-
-
-def cases_in(folder: Path, answers: Path) -> list[Path]:
-    """Return the cases of a folder in order of their names; makes the folder of their answers.
-
-    Raises InputError if there are none, or if the folder cannot be made.
-    """
-    if not any(folder.glob("*/bench.yaml")):
-        raise InputError(f"{folder}: holds no cases, allowed the folder of cases of a proof, DIR/cases")
-    try:
-        answers.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{answers}: cannot be made ({error.strerror}); give another folder") from None
-    return sorted(folder.iterdir())
 
 
 def _shares(jobs: int) -> list[set[int]]:

@@ -56,7 +56,7 @@ def explained(result: Result) -> bool:
 
 
 def _wandering(left: str) -> str:
-    """What is above the white noise of a channel and depends on nothing."""
+    """Sentence on channels whose remainder is above their white noise and has no structure; empty without one."""
     if NO_STRUCTURE not in left:
         return ""
     return f"{left.removesuffix('.')}: noise that wanders, or a random disturbance."

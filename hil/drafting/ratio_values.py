@@ -7,13 +7,12 @@ from hil.drafting.plant_values import TransmissionValues
 from hil.identification.derivatives import motion
 from hil.identification.least_squares import Estimate, least_squares
 from hil.identification.plain_model import plain_columns
-from hil.importing.usual_values import usual_lead
+from hil.importing.usual_values import SURE_TURNS, usual_lead
 from hil.quantities import ROTARY_LEAD_M
 from hil.recording.recording import Recording
 
 DIRECT = 0.02  # deviation from equal angles of motor and load up to which there is no gear
 _WHOLE = 1e-4  # relative deviation from a round value that is none: play between the encoders biases the measured one
-_SURE_TURNS = 0.05  # deviation from a whole number that is seldom seen by chance
 _LIKELY = 2.0  # standard errors within which a round value is taken
 
 
@@ -50,7 +49,7 @@ def gear_of(lead: Estimate) -> Estimate:
     measured = Estimate(ROTARY_LEAD_M / lead.value, ROTARY_LEAD_M / lead.value**2 * lead.std_error, lead.how)
     whole = float(round(measured.value))
     off = abs(measured.value - whole)
-    if whole < 1.0 or off == 0.0 or off > _SURE_TURNS or not _agrees(whole, measured):
+    if whole < 1.0 or off == 0.0 or off > SURE_TURNS or not _agrees(whole, measured):
         return measured
     return replace(measured, value=whole, how=f"{measured.how} ({measured.value:.7g} measured)")
 

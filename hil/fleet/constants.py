@@ -1,4 +1,4 @@
-"""What is constant of an axis, fitted once over a few of its recordings and then held for all.
+"""Constants of an axis, such as its inertia: fitted once over a few recordings, then the same for all.
 
 The inertia is that of the plain model over all of them; the masses of the bench file are scaled to it. The lead is the
 bench's where no table is measured. Recordings whose own inertia is far from the median of the first ones are of another

@@ -27,7 +27,7 @@ _ENDED = "ended the workers that read it, perhaps for want of memory"
 
 
 class WorkItem(NamedTuple):
-    """What one result is made of: its id, the axis, the file within the fleet, and what the work needs beside it."""
+    """One recording to work on: its id, its axis, its file within the fleet, and what the work needs beside it."""
 
     id: str
     axis: str

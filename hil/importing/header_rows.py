@@ -170,9 +170,10 @@ def _otherwise_split(fields: list[str], delimiter: str, width: int) -> list[str]
 def _regrouped(text: str, delimiter: str, width: int) -> list[str]:
     """Fields of a line whose names hold the delimiter: "Torque, actual [Nm]", "t / s   M %"; empty if none fits."""
     mark = re.escape(delimiter)
-    wide = r"\s{2,}" if delimiter.isspace() else rf"{mark}(?!\s)"
+    blanks = delimiter == " "
+    wide = r"\s{2,}" if blanks else rf"{mark}(?!\s)"
     for pattern in (wide, rf"(?<=[\])])\s*{mark}"):
-        fields = [one.strip(' "') for one in re.split(pattern, text.strip())]
+        fields = [one.strip(' "') for one in re.split(pattern, text.strip() if blanks else text)]
         if len(fields) == width:
             return fields
     return []

@@ -6,9 +6,9 @@ from hil.arrays import FloatArray
 from hil.channels import SPEED_SET_POINT, AxisChannels
 from hil.importing.relations import SAME_POSITION, proportional
 from hil.importing.unit_choice import MATCH
+from hil.importing.usual_values import SURE_TURNS
 
 SET_POINTS = ("position_command_m", "velocity_command_m_s", "acceleration_command_m_s2", SPEED_SET_POINT)
-_SURE_TURNS = 0.05  # deviation of a gear ratio from a whole number that is seldom seen by chance
 
 
 def gear_of_set_points(columns: Mapping[str, FloatArray], axis: AxisChannels) -> float:
@@ -26,4 +26,4 @@ def gear_of_set_points(columns: Mapping[str, FloatArray], axis: AxisChannels) ->
     if not follows or abs(over.factor) > 1.0 - MATCH:
         return 1.0
     gear = 1.0 / over.factor
-    return float(round(gear)) if abs(gear - round(gear)) < _SURE_TURNS else gear
+    return float(round(gear)) if abs(gear - round(gear)) < SURE_TURNS else gear

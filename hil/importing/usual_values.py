@@ -12,6 +12,7 @@ COUNTS = tuple(
     float(n * k) for n in (1, 4) for k in (500, 1000, 1024, 2000, 2048, 2500, 4096, 5000, 8192, 10000)
 ) + tuple(2.0**power for power in range(12, 25))
 USUAL = 2e-3  # relative deviation of a measured lead: following errors and lead errors are below
+SURE_TURNS = 0.05  # deviation of a gear ratio from a whole number that is seldom seen by chance
 LEADS_M = (0.010, 0.005, 0.020, 0.004, 0.016, 0.0025, 0.002, 0.025, 0.040, 0.008, 0.012, 0.032, 0.001)
 
 LEAST_M, MOST_M, MOST_RAD_S = 1e-6, 100.0, 1e5  # travel of a linear axis and speed of a rotary one: beyond is asked

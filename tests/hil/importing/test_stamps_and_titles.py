@@ -54,3 +54,15 @@ def test_names_of_several_words_stand_between_wide_blanks(tmp_path: Path) -> Non
     entries = {str(one.entry["column"]): one.entry for one in draft.channels}
     assert entries["Ist mm"]["unit"] == "mm"
     assert entries["M %"] == pytest.approx({"column": "M %", "unit": "%", "rated": 1.0})
+
+
+def test_wide_blanks_do_not_part_names_between_tabs(tmp_path: Path) -> None:
+    """A tab parts the columns there, also behind a name that is followed by blanks."""
+    rows = [
+        f"{row[0]:.3f}\t{row[1]:.6f}\t{row[2]:.5f}"
+        for row in zip(AXIS["t"], AXIS["angle"], AXIS["torque"], strict=True)
+    ]
+    path = tmp_path / "log.tab"
+    path.write_text("\n".join(["t [s]\tmotor  angle [rad]\ttorque  [Nm]\tvalid", *rows]) + "\n")
+    columns = {str(one.entry["column"]) for one in draft_map(path).channels}
+    assert columns == {"motor  angle [rad]", "torque  [Nm]"}

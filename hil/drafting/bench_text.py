@@ -16,8 +16,10 @@ def bench_text(draft: BenchDraft) -> str:
     lines += [f"  {_line(value)}" for value in draft.axis]
     if draft.control:
         lines += ["control:", *(f"  {_line(value)}" for value in draft.control)]
-    else:
+    elif draft.torque_delay is None:
         lines += [f"control: unknown   # {draft.control_why}"]
+    else:
+        lines += ["control:", f"  law: unknown   # {draft.control_why}", f"  {_line(draft.torque_delay)}"]
     lines += ["encoders:"]
     if draft.motor_encoder is not None:
         lines += ["  motor:", f"    {_line(draft.motor_encoder)}"]

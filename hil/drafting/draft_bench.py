@@ -12,6 +12,7 @@ from hil.drafting.plant_told import moving_parts, plant_told
 from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.ratio_values import gear_of
 from hil.drafting.sensor_values import noise_of
+from hil.identification.derived_channels import rows_are_ticks
 from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
 from hil.quantities import ROTARY_LEAD_M, digits, unit_of
@@ -36,6 +37,7 @@ class BenchDraft:
     axis: list[BenchValue] = field(default_factory=list)
     control: list[BenchValue] = field(default_factory=list)  # empty: unknown
     control_why: str = ""
+    torque_delay: BenchValue | None = None  # beside an unknown control law
     mechanisms: dict[str, list[BenchValue]] = field(default_factory=dict)  # by effect
     motor_encoder: BenchValue | None = None
     table_encoder: BenchValue | None = None
@@ -88,6 +90,8 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
         else:
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
+    if not draft.control:
+        draft.torque_delay = _torque_delay(recording, plant)
     if transmission is None and not draft.control:
         refuse_untold(draft.name, draft.kind, plant)
     _encoders(draft, recording)
@@ -96,6 +100,18 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
     draft.notes += notes
     draft.unsure += unsure
     return draft
+
+
+def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None:
+    """Delay of a torque whose rows are samples, of which the twin holds each until the next; None where not told."""
+    if plant.early_s is None or rows_are_ticks(recording):
+        return None
+    early = plant.early_s
+    way = f"{digits(1e3 * abs(early.value))} ms {'late' if early.value < 0.0 else 'early'}"
+    delay_s = early.value - 0.5 * recording.period_s
+    return BenchValue(
+        "torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", f"the torque is recorded {way}, and held for a row"
+    )
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:

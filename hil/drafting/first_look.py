@@ -43,6 +43,7 @@ def _plain(told: PlantTold, recording: Recording) -> list[str]:
     if plant.inertia.how == ASSUMED:
         return ["No torque is recorded: masses and friction cannot be told."]
     linear = recording.kind is AxisKind.LINEAR
+    effort = "force" if linear else "torque"
     units = ("kg", "N s/m", "N", "N") if linear else ("kg m^2", "N m s/rad", "N m", "N m")
     named = {
         "mass" if linear else "inertia at the motor": plant.inertia,
@@ -53,8 +54,15 @@ def _plain(told: PlantTold, recording: Recording) -> list[str]:
     values = ", ".join(f"{name} {_shown(one, unit)}" for (name, one), unit in zip(named.items(), units, strict=True))
     return [
         f"Plain model: {values}; it leaves {percent(plant.left)} of the "
-        f"{'force' if linear else 'torque'} (share of its standard deviation)."
+        f"{effort} (share of its standard deviation){_when(plant.early_s, effort)}."
     ]
+
+
+def _when(early_s: Estimate | None, effort: str) -> str:
+    if early_s is None:
+        return ""
+    way = "early" if early_s.value > 0.0 else "late"
+    return f"; the {effort} is recorded {quantity(abs(early_s.value), 's')} {way}"
 
 
 def _second_encoder(told: PlantTold) -> list[str]:

@@ -27,7 +27,8 @@ class PlantValues:
 
     `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load. `spring` is
     the torque over the motor's position k [N m/rad, N/m]. `one_way` is Coulomb friction and load together, in the
-    direction of a motion that does not tell them apart; then half of it stands for each.
+    direction of a motion that does not tell them apart; then half of it stands for each. `early_s` [s]: the torque is
+    recorded so much before the motion that it makes; None where it is not told.
     """
 
     inertia: Estimate
@@ -39,6 +40,7 @@ class PlantValues:
     gravity_angle: Estimate | None
     spring: Estimate | None
     one_way: Estimate | None = None
+    early_s: Estimate | None = None
 
     @property
     def offset_held(self) -> bool:
@@ -117,7 +119,9 @@ def plant_values(recordings: Sequence[Recording], load_ratio: float | None = Non
             for one, size in ((viscous, viscous.value), (coulomb, viscous.value * top))
         )
     viscous, coulomb = _at_feeds(recordings, viscous, coulomb) or (viscous, coulomb)
-    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, one_way)
+    rows = Estimate(model.early_rows, model.early_error_rows, fit.how)
+    early = rows.scaled(data[0].period_s) if model.early_rows else None
+    return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, one_way, early)
 
 
 def _together(fit: LinearFit, parts: dict[str, float]) -> Estimate:
@@ -128,8 +132,9 @@ def _together(fit: LinearFit, parts: dict[str, float]) -> Estimate:
 
 def _how(model: PlainModel, window_s: float) -> str:
     how = f"least squares of torque over motion where it slides, windows of {1e3 * window_s:.3g} ms"
-    if model.late_rows:
-        how += f", torque {model.late_rows:+.2f} rows after the position"
+    if model.early_rows:
+        late = model.early_rows < 0.0
+        how += f", torque recorded {abs(model.early_rows):.2f} rows {'late' if late else 'early'}"
     return how + {5: ", with a spring", 6: ", with gravity"}.get(len(model.fit.names), "")
 
 

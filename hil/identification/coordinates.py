@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import MechanismEntry
+from hil.identification.derivatives import SMOOTH_S
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
@@ -23,7 +24,7 @@ TRUST = 3.0
 # in the unit of the parameter.
 LITTLE, LITTLE_STEP, ANY = 1e-3, 1e-2, 1e6
 # Delay of a recorded torque whose rows are not the ticks of the drive. A mean over the tick before or after a row, or
-# a sample of it, shifts it by up to a row and a half.
+# a sample of it, shifts it by up to a row and a half; the filter of the drive's current by what the plain model tells.
 DELAY, MOST_DELAY = "torque_delay_s", 1.5
 
 
@@ -102,7 +103,7 @@ def axis_coordinate(name: str, value: float) -> Coordinate:
 
 def delay_coordinate(delay_s: float, period_s: float) -> Coordinate:
     """The coordinate of the delay of a recorded torque."""
-    most_s = MOST_DELAY * period_s
+    most_s = MOST_DELAY * period_s + 0.5 * SMOOTH_S
     return Coordinate(DELAY, period_s, False, delay_s - most_s, delay_s + most_s, least_step=1e-3)
 
 

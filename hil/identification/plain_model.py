@@ -31,6 +31,7 @@ from hil.identification.derivatives import (
     matched,
     matched_motion,
     noise_gains,
+    window_rows,
 )
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
 from hil.identification.parallel import one_blas_thread
@@ -141,20 +142,21 @@ def _noise(position: FloatArray) -> tuple[float, float]:
 class PlainModel:
     """Fit of the plain model, the least speeds of the rows that were fitted, and the ratio of a load that turns.
 
-    `late_rows`: rows by which the torque of a row is later than its position; a mean until the next row has 0.5.
+    `early_rows`: rows by which the torque is recorded before its motion; a mean until the next row has 0.5.
     """
 
     fit: LinearFit
     slowest: SlowestSliding
     load_ratio: float | None = None
-    late_rows: float = 0.0
+    early_rows: float = 0.0
+    early_error_rows: float = 0.0  # standard error
 
     def __getitem__(self, name: str) -> Estimate:
         return self.fit[name]
 
     def predict(self, moved: MeasuredMotion) -> FloatArray:
         """Torque (n,) of the model on a motion."""
-        return self.fit.predict(plain_columns(_later(moved, self.late_rows), self.load_ratio, spring=True))
+        return self.fit.predict(plain_columns(_later(moved, self.early_rows), self.load_ratio, spring=True))
 
 
 @one_blas_thread
@@ -163,8 +165,8 @@ def fit_plain_model(
 ) -> PlainModel | None:
     """Fit the plain model to the sliding rows of recordings of one axis; None without sliding motion.
 
-    A `spring`, or gravity on a load that turns (`load_ratio`), and the time of the torque against the position within a
-    row, are fitted where the rows earn them.
+    A `spring`, or gravity on a load that turns (`load_ratio`), and the time of the torque against the position, within
+    the window about a sliding row, are fitted where the rows earn them.
     """
     top = max((float(np.max(np.abs(one.moved.velocity[one.rows]), initial=0.0)) for one in data), default=0.0)
     slowest = _slowest(data, top)
@@ -186,10 +188,10 @@ def fit_plain_model(
         for name, at in (("inertia", 2), ("viscous", 1))
     }
 
-    def stacked(names: Sequence[str], late_rows: float, slope: LinearFit | None = None) -> dict[str, FloatArray]:
+    def stacked(names: Sequence[str], early_rows: float, slope: LinearFit | None = None) -> dict[str, FloatArray]:
         found = []
         for one, rows in used:
-            every = {**plain_columns(_later(one.moved, late_rows), load_ratio, spring=True)}
+            every = {**plain_columns(_later(one.moved, early_rows), load_ratio, spring=True)}
             speed = every["viscous"] / top
             every |= {"slow": every["coulomb"] * np.exp(-np.abs(speed) / _BEND), "fast": speed * np.abs(speed)}
             if slope is not None:  # change of the torque per row
@@ -203,9 +205,9 @@ def fit_plain_model(
         wider = float(stdtrit(free, 0.975) / ndtri(0.975))
         return replace(fit, std_errors=wider * fit.std_errors, covariance=wider**2 * fit.covariance)
 
-    def structure(late_rows: float) -> LinearFit:
-        plain = fitted(stacked((*MOTION, *_LAW), late_rows))
-        tried = [fitted(stacked((*MOTION, *_LAW, *names), late_rows)) for names in more]
+    def structure(early_rows: float) -> LinearFit:
+        plain = fitted(stacked((*MOTION, *_LAW), early_rows))
+        tried = [fitted(stacked((*MOTION, *_LAW, *names), early_rows)) for names in more]
         earned = [
             one
             for one, names in zip(tried, more, strict=True)
@@ -213,20 +215,24 @@ def fit_plain_model(
         ]
         return min(earned, key=lambda one: one.held_out, default=plain)
 
-    best, late_rows = structure(0.0), 0.0
-    for _ in range(4):
-        timed = fitted(stacked(best.names, late_rows, best))
-        late_rows = float(np.clip(late_rows + timed[_LOGGED].value, -1.0, 1.0))
-    again = structure(late_rows)
-    if not (abs(late_rows) > SIGMAS * timed[_LOGGED].std_error and again.held_out < best.held_out):
-        again, late_rows = best, 0.0
+    best, early_rows = structure(0.0), 0.0
+    # half the shortest window and a row: so far about a sliding row the axis moves the same way
+    most = min(window_rows(one.period_s) // 2 + 1 for one, _ in used)
+    for _ in range(8):
+        timed = fitted(stacked(best.names, early_rows, best))
+        early_rows = float(np.clip(early_rows + timed[_LOGGED].value, -most, most))
+        if abs(timed[_LOGGED].value) < 0.1 * timed[_LOGGED].std_error:
+            break
+    again = structure(early_rows)
+    if not (abs(early_rows) > SIGMAS * timed[_LOGGED].std_error and again.held_out < best.held_out):
+        again, early_rows = best, 0.0
 
     def final(names: Sequence[str]) -> LinearFit:
         """The fit with errors that count the delay and the bend; without a term that they do not leave."""
-        fit, bent = (fitted(stacked((*names, *law), late_rows)) for law in ((), _LAW))
+        fit, bent = (fitted(stacked((*names, *law), early_rows)) for law in ((), _LAW))
         errors = fit.std_errors
-        if late_rows:
-            errors = np.maximum(errors, fitted(stacked(names, late_rows, fit)).std_errors[:-1])
+        if early_rows:
+            errors = np.maximum(errors, fitted(stacked(names, early_rows, fit)).std_errors[:-1])
         if bent.differs(_LAW) and bent.held_out < fit.held_out:
             errors = np.hypot(errors, bent.values[: len(names)] - fit.values)
         scale = np.ones(len(names))
@@ -235,7 +241,7 @@ def fit_plain_model(
         return fit if len(names) == len(MOTION) or fit.differs(names[len(MOTION) :]) else final(MOTION)
 
     fit = final([name for name in again.names if name not in _LAW])
-    return PlainModel(fit, slowest, load_ratio, late_rows)
+    return PlainModel(fit, slowest, load_ratio, early_rows, timed[_LOGGED].std_error if early_rows else 0.0)
 
 
 def _slowest(data: Sequence[MotionData], top: float) -> SlowestSliding:
@@ -260,17 +266,21 @@ def _slowest(data: Sequence[MotionData], top: float) -> SlowestSliding:
 
 
 def _later(moved: MeasuredMotion, rows: float) -> MeasuredMotion:
-    """Motion `rows` (-1 to 1) after each row; half a row after it as a mean until the next one.
+    """Motion `rows` after each row; half a row after it as a mean until the next one. The ends are held.
 
-    Of weights (3,) over neighbours the first moment is the time, the second its square and the variance |t| (1 - |t|) /
-    3 of the mean, 1/12 for half a row.
+    Of weights (3,) over neighbours the first moment is the time t, -1 to 1, the second its square and the variance
+    |t| (1 - |t|) / 3 of the mean, 1/12 for half a row.
     """
     if rows == 0.0:
         return moved
-    second = rows**2 + abs(rows) * (1.0 - abs(rows)) / 3.0
-    weights = np.array([0.5 * (second + rows), 1.0 - second, 0.5 * (second - rows)])  # of the row after, at, before
+    whole = int(rows)
+    t = rows - whole
+    second = t**2 + abs(t) * (1.0 - abs(t)) / 3.0
+    weights = np.array([0.5 * (second + t), 1.0 - second, 0.5 * (second - t)])  # of the row after, at, before
+    last = moved.position.size - 1
+    shifted = np.clip(np.arange(last + 1) + whole, 0, last)
 
     def at(values: FloatArray) -> FloatArray:
-        return np.asarray(convolve1d(values, weights, mode="nearest"), dtype=np.float64)
+        return np.asarray(convolve1d(values[shifted], weights, mode="nearest"), dtype=np.float64)
 
     return MeasuredMotion(at(moved.position), at(moved.velocity), at(moved.acceleration), moved.direction)

@@ -27,6 +27,9 @@ from hil.twin.structure.modal import Modal, lowest_modes
 # step, modes are exact.
 FINE_STEP_S = 20e-6
 COARSE_STEP_S = 200e-6
+# Both are for rows of 1 ms, and grow with longer ones, whose torque is held for longer: up to 4 times, and as far as a
+# fine step is short against the fastest mode [rad], for forces of the transmission that act against its spring.
+_ROWS_S, _MOST_GROWTH, _SHORT_RAD = 1e-3, 4.0, 0.4
 
 _NOTHING = np.empty(0)
 _RIGHT = np.empty((2, 0))
@@ -60,8 +63,8 @@ class Twin:
     """Axis with its control law and its active mechanisms.
 
     `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
-    internal steps, of which a whole number makes a control tick; equal values give a fixed step. `push_n` (n,) is a
-    force on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
+    internal steps at ticks of 1 ms, of which a whole number makes a tick; equal values give a fixed step. `push_n` (n,)
+    is a force on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
     """
 
     physics: Physics
@@ -89,8 +92,10 @@ class Twin:
 
     @cached_property
     def _arrays(self) -> Arrays:
+        period_s, fastest = self.gains.period_s, float(np.max(self.modal.frequency_rad_s))
+        growth = min(period_s / _ROWS_S, _MOST_GROWTH, _SHORT_RAD / max(fastest * self.fine_step_s, 1e-9))
         coarse, fine = (
-            max(math.ceil(self.gains.period_s / longest_s - 1e-6), 1)
+            max(math.ceil(period_s / (max(growth, 1.0) * longest_s) - 1e-6), 1)
             for longest_s in (self.coarse_step_s, self.fine_step_s)
         )
         arrays = pack(self.physics, self.chain, self.modes, self.gains, self.active, (coarse, fine), self.observer_s)

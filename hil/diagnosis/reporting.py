@@ -153,7 +153,9 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
     """Unexplained share of the energy above the floor, and the channels above their noise."""
     final, held_out, change = judged.final, judged.tested.searched.prepared.held_out, judged.change
     none = judged.of_plant is Verdict.NO_MISMATCH
-    share = 0.0 if none else unexplained_share(judged.before, final, held_out)
+    alike = like_noise(final, judged.structure)
+    # beside terms a channel whose remainder is like noise does not count, as for the rule on the explanation
+    share = 0.0 if none else unexplained_share(judged.before, final, held_out, alike if final.terms else ())
     fits: tuple[Fit, ...] = final.on(final.data), final.on(held_out)
     if change:
         share, fits = change.left, change.parts
@@ -166,9 +168,9 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
     above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
     if not above:
         return Unexplained(share=share, description=AT_FLOOR)
-    alike = {names[name] for name in like_noise(final, judged.structure)}
+    quiet = {names[name] for name in alike}
     text = ", ".join(
-        f"{spoken(name)} {digits(above[name])} times" + (f" {NO_STRUCTURE}" if name in alike else "")
+        f"{spoken(name)} {digits(above[name])} times" + (f" {NO_STRUCTURE}" if name in quiet else "")
         for name in sorted(above, key=lambda n: -above[n])
     )
     if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:

@@ -1,8 +1,8 @@
 """Summary of a diagnosis on the terminal."""
 
-from hil.diagnosis.result import Result, TorqueLeft
+from hil.diagnosis.result import Finding, Result, TorqueLeft
 from hil.diagnosis.wording import named, spoken
-from hil.quantities import digits, percent, quantity
+from hil.quantities import digits, known_quantity, percent, quantity
 from hil.report.console import out, table
 
 
@@ -30,14 +30,20 @@ def print_diagnosis(result: Result) -> None:
     if result.findings:
         out.print()
         table(
-            ("found", "confidence that it is there"),
-            [(named(finding), percent(finding.confidence)) for finding in result.findings],
+            ("found", "size", "confidence that it is there"),
+            [(named(finding), _size(finding), percent(finding.confidence)) for finding in result.findings],
         )
     if result.torque_left:
         out.print(f"\n{torque_line(result.torque_left)}")
     if result.not_identifiable:
         out.print(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}; no correction is given.")
     out.print(f"\n{result.statement}\n")
+
+
+def _size(finding: Finding) -> str:
+    """The first parameter of a finding, its strength; empty for windows, which have one each."""
+    first = next(iter(finding.parameters.values()), None)
+    return "" if first is None else known_quantity(first.value, first.std or 0.0, first.unit)
 
 
 def torque_line(left: TorqueLeft) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -31,20 +31,25 @@ def location_figure(diagnosis: Diagnosis) -> Drawing:
     seen = mismatch_energies(before, diagnosis.final)
     figure = Drawing(WIDTH_IN, 8.2)
     names = channel_names(diagnosis.given_bench, diagnosis.train.runs[0])
-    blocks = {spoken(names[name]): share for name, share in block_shares(before).items()}
-    first = "block" if any(blocks.values()) else "phase"  # no channel shows what is below the noise of a row
-    axes = figure.subplot_mosaic([[first, "phase"], ["position", "speed"], ["time", "time"]])
-    if first == "block":
-        _shares(axes["block"], blocks, "Channel that shows it")
-    _shares(axes["phase"], {title(phase.kind): phase.share for phase in phase_shares(seen)}, "Phase of motion")
+    shares = {
+        "Channel that shows it": {spoken(names[name]): share for name, share in block_shares(before).items()},
+        "Phase of motion": {title(phase.kind): phase.share for phase in phase_shares(seen)},
+    }
+    told = [heading for heading, own in shares.items() if any(own.values())]  # none below the noise of a row
+    first: list[Any] = [[told[0], told[-1]]] if told else []
+    axes = figure.subplot_mosaic([*first, ["position", "speed"], ["time", "time"]])
+    for heading in told:
+        _shares(axes[heading], shares[heading], heading)
     excess = np.concatenate([energy.rows for energy in seen])
-    position = np.concatenate([1e3 * energy.run.position_command_m for energy in seen])
-    factor, unit = speed_unit(diagnosis.given_bench.axis.turns)
+    turns = diagnosis.given_bench.axis.turns
+    position = np.concatenate([(180.0 / np.pi if turns else 1e3) * energy.run.position_command_m for energy in seen])
+    factor, unit = speed_unit(turns)
     speed = np.concatenate([factor * np.abs(energy.run.velocity_command_m_s) for energy in seen])
     _density(axes["position"], position, excess)
-    style_axis(axes["position"], ENERGY, "position of the table [mm]", "Mean over the travel")
+    where = "angle of the load [°]" if turns else "position of the table [mm]"
+    style_axis(axes["position"], ENERGY, where, "Mean over the travel")
     _density(axes["speed"], speed, excess)
-    style_axis(axes["speed"], ENERGY, f"speed of the table [{unit}]", "Mean over the speed")
+    style_axis(axes["speed"], ENERGY, f"speed of the {'load' if turns else 'table'} [{unit}]", "Mean over the speed")
     run, rows = seen[0].run, seen[0].rows
     size = max(round(TIME_BIN_S / run.period_s), 1)
     starts = np.arange(0, rows.size, size)

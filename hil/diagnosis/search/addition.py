@@ -173,8 +173,12 @@ def _hats(values: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(values, knots, one) for one in np.eye(knots.size)])
 
 
-def torque_of(fit: Fit, without: Fit, term: Term, data: Dataset) -> tuple[float, float] | None:
+def torque_of(
+    fit: Fit, without: Fit, term: Term, data: Dataset, given: Fit | None = None
+) -> tuple[float, float] | None:
     """Torque missed on recordings with a term of the plant and without it; None where the torque says nothing of it.
+
+    Without it is also the twin of the bench file, if `given`: a fit whose other parameters pay for a term is worse.
 
     An error of the transmission is no torque on an axis without a spring. One of the motor's encoder is: a motion that
     is read late, or wrong over the angle, needs another torque.
@@ -188,7 +192,8 @@ def torque_of(fit: Fit, without: Fit, term: Term, data: Dataset) -> tuple[float,
     left, other = torque_missed(fit, data), torque_missed(without, data)
     if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion
         return None
-    return left, other
+    bench = None if given is None else torque_missed(given, data)
+    return left, other if bench is None or not np.isfinite(bench) else min(other, bench)
 
 
 def harm(fit: Fit, without: Fit, given: Fit) -> dict[str, Harm]:

@@ -50,10 +50,10 @@ _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 def chance_below_noise(fit: Fit, without: Fit) -> float | None:
     """Chance of the shape of a term where the fit without it is within its noise; else None."""
-    return chance_of_shape(fit, without) if without.within_noise else None
+    return chance_of_shape(fit.hypothesis, without) if without.within_noise else None
 
 
-def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
+def chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> float:
     """Probability that chance makes the shape of one of all mechanisms in what the fit without it leaves.
 
     By the number of values that were searched, see `_searched`. 1 where nothing tells, for less than what correct
@@ -63,10 +63,10 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     asked, best = _asked(without), 1.0
     if asked is None:
         return best
-    searched, (shaped, share) = _searched(fit) - _searched(without), _faint(fit, without)
-    offset = any(
-        Active(term.effect, term.values, term.variant).is_offset for term in _added(fit, without)
-    )  # then one is the shape, and no nuisance
+    added = _added(found, without)
+    searched, (shaped, share) = _searched(found) - _searched(without.hypothesis), _faint(found, added, without)
+    # then one is the shape, and no nuisance
+    offset = any(Active(term.effect, term.values, term.variant).is_offset for term in added)
     for channel, own in asked.channels.items():
         after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
         shape = own.quiet - after
@@ -84,20 +84,19 @@ def chance_of_shape(fit: Fit, without: Fit, fitted: bool = True) -> float:
     return best
 
 
-def _added(fit: Fit, without: Fit) -> list[Term]:
+def _added(found: Hypothesis, without: Fit) -> list[Term]:
     known = {term.key for term in without.terms}
-    return [term for term in fit.terms if term.key not in known]
+    return [term for term in found.resolved.terms if term.key not in known]
 
 
-def _faint(fit: Fit, without: Fit) -> tuple[Hypothesis, float]:
+def _faint(found: Hypothesis, added: Sequence[Term], without: Fit) -> tuple[Hypothesis, float]:
     """The fit, or the one without its term and little of the friction that it adds: of more the twin would stick.
 
     With the share of the term's strength.
     """
-    added = _added(fit, without)
     mechanism = BY_ID[added[-1].effect] if added else None
     if mechanism is None or mechanism.variants[added[-1].variant].stage is not Stage.COULOMB:
-        return fit.hypothesis, 1.0
+        return found, 1.0
     values, none = list(added[-1].values), 0.0
     if mechanism.neutral is not None:
         none = mechanism.neutral(axis_facts(without.bench, without.data.runs))
@@ -171,13 +170,13 @@ def _joined(parts: Sequence[ResidualSeries], rows: Sequence[NDArray[np.bool_]]) 
     return np.concatenate([one.left[at] for one, at in zip(parts, rows, strict=True)])
 
 
-def _searched(fit: Fit) -> float:
+def _searched(found: Hypothesis) -> float:
     """Logarithm, over that of the independent rows, of the number of values in which the terms were searched.
 
     A half for each parameter beside a strength (Schwarz 1978), one for the edge of a window, a line or a period, of
     which as many are told apart as there are rows (Y.-C. Yao, Statistics and Probability Letters 6 (1988) 181).
     """
-    roles = [one.role for one in fit.hypothesis.coordinates if one.parameter is not None]
+    roles = [one.role for one in found.coordinates if one.parameter is not None]
     return sum(1.0 if role in _MANY else 0.5 for role in roles if role is not Role.STRENGTH)
 
 
@@ -251,7 +250,7 @@ def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Candidates whose shape, at the values where their search begins, is in what a base leaves, the clearest first."""
 
     def chance(one: Candidate) -> float:
-        begun = (base.estimator.evaluate(base.hypothesis.with_term(term)) for term in (one.term, *one.others))
+        begun = (base.hypothesis.with_term(term) for term in (one.term, *one.others))
         return min(chance_of_shape(start, base, fitted=False) for start in begun)
 
     _asked(base)  # once, before the jobs ask for it

@@ -174,7 +174,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
             not final.jacobian.size or strength_over_error(final, index) > 1.0,  # without a Jacobian it is not told
             _quiet(final, other),
-            torque_of(final, other, term, held_out),
+            torque_of(final, other, term, held_out, given),
             harm(final, other, given),
         )
 

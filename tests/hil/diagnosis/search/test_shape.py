@@ -38,7 +38,7 @@ def base(*terms: Term) -> Fit:
 def test_a_shape_below_the_noise_is_told_where_it_is(terms: tuple[Term, ...], told: bool) -> None:
     without = base(*terms)
     begun = without.estimator.evaluate(without.hypothesis.with_term(COGGING))
-    assert (chance_of_shape(begun, without) < NEEDED) == told
+    assert (chance_of_shape(begun.hypothesis, without) < NEEDED) == told
     assert [one.term for one in shown(without, [Candidate(COGGING, 0.0)])] == [COGGING] * told
 
 
@@ -46,8 +46,8 @@ def test_a_shape_of_the_opposite_sign_is_told_only_before_it_is_fitted() -> None
     without = base(COGGING)
     opposite = replace(COGGING, values=(0.05, 6.0, 0.4 + math.pi))
     begun = without.estimator.evaluate(without.hypothesis.with_term(opposite))
-    assert chance_of_shape(begun, without) > 0.5
-    assert chance_of_shape(begun, without, fitted=False) < NEEDED
+    assert chance_of_shape(begun.hypothesis, without) > 0.5
+    assert chance_of_shape(begun.hypothesis, without, fitted=False) < NEEDED
 
 
 def test_a_delay_or_a_resonance_that_passes_less_noise_is_not_told() -> None:

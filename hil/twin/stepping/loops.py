@@ -146,9 +146,12 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
         state, wanted[k] = _follow(gains, state, inputs, command[k], c.period)
         error = measured_motor[k] - motor[k]
         _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
+        own_table = table[k]
+        if not rigid:  # it follows the mean of a motor that is put back by 2 T / time constant x error at each tick
+            table[k] -= c.ratio * c.period / c.observer * error
         if measured_table.size:
             free = resting[k] or own.floating > 0.0
-            apart = measured_table[k] - table[k] - c.ratio * error
+            apart = measured_table[k] - own_table - c.ratio * error
             if not free:
                 moved += 1
                 datum += (apart - datum) / (moved + min(settled, 1))
@@ -157,7 +160,7 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
                 settled += 1
                 datum += (apart - datum) / settled
             if free and moved + settled > 0 and not rigid:
-                error = (measured_table[k] - datum - table[k]) / c.ratio
+                error = (measured_table[k] - datum - own_table) / c.ratio
                 _correct(shapes.table_impulse, error, c.period, hold, delta)
         if push.size:
             own.push = push[k]

@@ -66,11 +66,11 @@ def _mark() -> Path:
 
 
 def _versions() -> str:
-    """Return what a kernel depends on beside its sources: numba, Python and the processor."""
+    """Return what a kernel depends on beside its sources: numba, Python, the processor, and its folder."""
     import sys
     from importlib.metadata import version
 
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
     processor = f"{get_host_cpu_name()} {get_host_cpu_features().flatten()}"
-    return f"numba {version('numba')}, {sys.implementation.cache_tag}, {processor}\n"
+    return f"numba {version('numba')}, {sys.implementation.cache_tag}, {processor}\n{provide_kernel_cache()}\n"

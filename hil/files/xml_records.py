@@ -12,7 +12,9 @@ from xml.etree.ElementTree import Element, iterparse
 from hil.files.input_file import check_values
 
 _WHOLE_NAN = 0x7FF0_0000_0000_0000  # an IEEE 754 number without a value, whose bits were written as a whole number
-_TITLES, _UNITS = ("description", "name"), ("units", "unit")  # attributes of an element that tells of a column
+# attributes of an element that tells of a column
+_TITLES = ("description", "name", "bezeichnung", "nom", "nome", "nombre")
+_UNITS = ("units", "unit", "einheit", "unite", "unita", "unidad", "uom")
 
 
 def xml_columns(path: Path) -> tuple[dict[str, list[Any]], dict[str, str]]:
@@ -29,7 +31,7 @@ def xml_columns(path: Path) -> tuple[dict[str, list[Any]], dict[str, str]]:
             continue  # a value of the element around it
         record = element.attrib | {_tag(one): (one.text or "").strip() for one in element if not len(one)}
         if "id" in element.attrib:
-            about[element.attrib["id"]] = element.attrib
+            about[element.attrib["id"]] = {key.lower(): text for key, text in element.attrib.items()}
         elif record:
             records.setdefault(_tag(element), []).append(record)
             values += len(record)

@@ -261,7 +261,7 @@ class Estimator:
         size = np.zeros(at.x.size)
         used, converged = 1, False
         while used < evaluations and not self.expired:
-            loss, weights = robust_loss(residuals.vector, soft)
+            loss, weights = robust_loss(residuals.vector, soft) if soft else residuals.likelihood_loss
             normal, descent = normal_equations(slopes, residuals.vector, weights)
             size = np.maximum(size, np.sqrt(np.diag(normal)))
             step = damped_step(normal, descent, damping, size, low - at.x, high - at.x)
@@ -276,7 +276,7 @@ class Estimator:
             moved = at.moved(at.x + step)
             there = self.residuals(moved)
             used += 1
-            gained = loss - robust_loss(there.vector, soft)[0]
+            gained = loss - (robust_loss(there.vector, soft) if soft else there.likelihood_loss)[0]
             if gained > 0.0:
                 fresh = held is not None or abs(gained / promised - 1.0) > _AGREES
                 if not fresh:

@@ -63,7 +63,13 @@ def described(lines: Sequence[str], names: Sequence[str], of_units: bool = False
 
 
 def _of_one(line: str, name: str) -> tuple[str, str] | None:
-    """Words and unit of a line that begins with a column's name: "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"."""
+    """Words and unit of a line that begins with a column's name, or ends with it and a unit.
+
+    "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"; "COL 3  POS.ACT  mm".
+    """
+    last = re.search(rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+[\[({{]?([^\s\])}}]+)[\])}}]?\s*$", line)
+    if last and unit_named(last[1]):
+        return "", last[1]
     match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
     if match is None:
         return None

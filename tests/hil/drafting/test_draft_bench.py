@@ -156,6 +156,21 @@ def test_a_late_second_encoder_is_said(tmp_path: Path) -> None:
     assert tmp_path.exists()
 
 
+@pytest.mark.parametrize("late_rows", [1, 4, 7])
+def test_a_torque_that_is_recorded_late_is_in_the_bench(tmp_path: Path, late_rows: int) -> None:
+    torque = np.roll(SCREW["torque_Nm"], late_rows)
+    torque[:late_rows] = torque[late_rows]
+    for folder in ("late", "prompt"):
+        (tmp_path / folder).mkdir()
+    path = drafted(tmp_path / "late", SCREW | {"torque_Nm": torque})
+    bench, prompt = load_bench(path), load_bench(drafted(tmp_path / "prompt", SCREW))
+    period_s = SCREW["time_s"][1] - SCREW["time_s"][0]
+    begun_s = prompt.torque_delay_s if prompt.torque_delay_s is not None else -0.5 * period_s
+    assert bench.torque_delay_s == pytest.approx(begun_s - late_rows * period_s, abs=0.1 * period_s)
+    assert bench.axis.mass_kg == pytest.approx(prompt.axis.mass_kg, rel=0.02)
+    assert "ms late, and held for a row" in path.read_text()
+
+
 def test_the_step_of_a_quantised_channel_is_found_and_none_in_a_smooth_one() -> None:
     smooth = np.cumsum(np.random.default_rng(5).normal(size=5000))
     assert count_of(smooth) is None

@@ -207,7 +207,7 @@ def test_slow_and_averaged_rows_tell_coulomb_from_viscous_friction(period_s: flo
     np.testing.assert_allclose([model[name].value for name in ("coulomb", "viscous", "offset")], reference, atol=0.02)
 
 
-def test_torque_that_is_a_mean_until_the_next_row_is_found_to_be_later() -> None:
+def test_torque_that_is_a_mean_until_the_next_row_is_found_to_be_early() -> None:
     """Position sampled at the begin of rows of 20 ms, torque a mean over them."""
     time, step = np.arange(40_000) * 1e-3, 20
     position = 3.0 * np.sin(2.1 * time) + 1.5 * np.sin(5.3 * time)
@@ -216,7 +216,7 @@ def test_torque_that_is_a_mean_until_the_next_row_is_found_to_be_later() -> None
     torque = 0.02 * acceleration + 0.1 * velocity + 0.7 * np.sign(velocity)
     torque += 0.01 * np.random.default_rng(1).normal(size=time.size)
     model = fitted(position[::step], torque.reshape(-1, step).mean(axis=1), None, 0.02)
-    assert model.late_rows == pytest.approx(0.5, abs=0.1)
+    assert model.early_rows == pytest.approx(0.5, abs=0.1)
     assert model["inertia"].value == pytest.approx(0.02, rel=0.02)
     assert model["coulomb"].value == pytest.approx(0.7, rel=0.02)
 

@@ -140,3 +140,32 @@ def test_a_channel_far_below_its_noise_counts_with_the_mean_of_all() -> None:
     motor, table = (Residuals.by_channel.func(residuals)[name] for name in ("motor", "table"))
     assert motor.noise == pytest.approx(50.5)
     assert (table.energy, table.noise) == pytest.approx((400.0, 100.0))
+
+
+def test_a_channel_above_its_floor_weighs_what_it_leaves() -> None:
+    rng = np.random.default_rng(3)
+    known = Hypothesis(OWNER).residuals(dataset(preflight([recorded(OWNER)], OWNER).accepted(), OWNER))
+    names = [name for _, name in known.parts]
+    assert {"motor", "table"} <= set(names)
+    size = {"motor": 9.0}
+    vector = np.concatenate(
+        [size.get(name, 0.5) * rng.standard_normal(one.size) for (_, name), one in known.parts.items()]
+    )
+
+    def of(vector: np.ndarray) -> Residuals:
+        residuals = replace(known)
+        residuals.__dict__["vector"] = vector
+        return residuals
+
+    (loss, weights), parts = of(vector).likelihood_loss, dict(zip(names, known.split(vector), strict=True))
+    mean = {name: float(part @ part) / part.size for name, part in parts.items()}
+    expected = sum(
+        part.size * (1.0 + np.log(mean[name]) if name == "motor" else mean[name]) for name, part in parts.items()
+    )
+    assert loss == pytest.approx(expected)
+    by_name = dict(zip(names, known.split(weights), strict=True))
+    np.testing.assert_allclose(by_name["motor"], mean["motor"] ** -0.5)
+    np.testing.assert_array_equal(by_name["table"], 1.0)
+    # the weighted squares go down as the loss does: slope along the residuals themselves
+    slope = (of((1.0 + 1e-6) * vector).likelihood_loss[0] - loss) / 1e-6
+    assert slope == pytest.approx(2.0 * float((weights * vector) @ (weights * vector)), rel=1e-4)

@@ -54,6 +54,20 @@ def test_columns_are_described_in_turn(line: str, wanted: list[str]) -> None:
     assert told["c2"][0].startswith("motor")
 
 
+def test_a_line_for_each_column_may_end_with_its_unit() -> None:
+    lines = [
+        "# COL 1  TIME      s",
+        "# COL 2  POS.CMD   mm",
+        "# COL 3  POS.ACT   mm",
+        "# COL 4  TRQ.ACT   %",
+        "# POS.ACT TRQ.ACT",
+    ]
+    told = described(lines, ["TIME", "POS.CMD", "POS.ACT", "TRQ.ACT"])
+    assert {name: unit for name, (_, unit) in told.items()} == {
+        "TIME": "s", "POS.CMD": "mm", "POS.ACT": "mm", "TRQ.ACT": "%",
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("line", ["c1,c2,c3", "c1 was 5 mm, c2 = 3 s", "about c1 and c2"])
 def test_prose_describes_no_column(line: str) -> None:
     assert described([line], ["c1", "c2", "c3"]) == {}
@@ -96,3 +110,18 @@ def test_without_a_lead_it_is_asked(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(csv_text(columns))
     assert [(one.channel, one.key) for one in draft_map(path).asked] == [("", "lead_m")]
+
+
+def test_attributes_of_an_xml_file_may_be_german(tmp_path: Path) -> None:
+    path = tmp_path / "log.xml"
+    channels = (("k1", "Lageistwert", "rad", AXIS["angle"]), ("k2", "Stromsollwert", "mA", 1e3 * AXIS["torque"]))
+    about = "".join(f'<Kanal id="{key}" name="{name}" Einheit="{unit}"/>' for key, name, unit, _ in channels)
+    rows = "".join(
+        f'<W t="{t:.4f}" k1="{a:.6f}" k2="{i:.3f}"/>'
+        for t, a, i in zip(AXIS["t"], channels[0][3], channels[1][3], strict=True)
+    )
+    path.write_text(f"<Aufzeichnung><Kanaele>{about}</Kanaele><Werte>{rows}</Werte></Aufzeichnung>")
+    found = {one.channel: one.entry for one in draft_map(path).channels}
+    assert (found["motor_position_rad"]["column"], found["motor_position_rad"]["unit"]) == ("Lageistwert", "rad")
+    current = next(entry for entry in found.values() if entry["column"] == "Stromsollwert")
+    assert (current["unit"], current["scale"]) == ("A", 0.001)

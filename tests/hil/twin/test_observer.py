@@ -47,3 +47,22 @@ def test_two_masses_are_held_at_any_damping_over_period(period_s: float, damping
     error, motion = held(Twin(strong, gains, observer_s=LEAST_TICKS * period_s), period_s)
     # what is left is friction that sticks at another torque; an unstable observer leaves many times the motion
     assert np.max(np.abs(error[-200:])) < 1e-4 * np.ptp(motion)
+
+
+@pytest.mark.parametrize("period_s", [0.001, 0.004])
+def test_a_torque_that_is_wrong_is_no_error_of_the_table(period_s: float) -> None:
+    bench = load_bench("reference")
+    physics = bench.axis.physics()
+    twin = Twin(physics, bench.gains._replace(period_s=period_s), observer_s=LEAST_TICKS * period_s)
+    time_s = np.arange(round(4.0 / period_s)) * period_s
+    torque = 4.0 * physics.coulomb_n_m * np.sign(np.sin(2.0 * np.pi * 0.5 * time_s))
+    true = twin.drive(torque)
+    less = replace(twin, physics=replace(physics, coulomb_n_m=0.5 * physics.coulomb_n_m))
+    found = less.observe(np.zeros(time_s.size), np.zeros(time_s.size), Response(*true[:2], torque, torque))
+    motor = true.motor_position - found.motor_position
+    stretch = true.table_position_m - found.table_position_m - twin.gains.ratio_m_rad * motor
+    away, back = (way * np.sin(2.0 * np.pi * 0.5 * time_s) > 0.5 for way in (1.0, -1.0))  # from the reversals
+    errors = [float(np.median(motor[rows])) * twin.gains.ratio_m_rad for rows in (away, back)]
+    seen = [float(np.median(stretch[rows])) for rows in (away, back)]
+    # beside the motor as it is before the observer puts it back, the table would differ by half the motor's error
+    assert abs(seen[0] - seen[1]) < 0.1 * abs(errors[0] - errors[1])

@@ -1,11 +1,12 @@
 """Change points of a quantity over months: steps and slopes, by a penalized likelihood with a bounded rate of false ones.
 
-    min over partitions and noises   n log(chi^2 / n) + sum over segments of log det + threshold (changes + slopes)
+    min over partitions and noises   n log(chi^2 / n) + segments log det + order log n + threshold (changes + slopes)
 
 Each segment has a level of its own, and a slope if that pays one more threshold. The noise is correlated from one
 recording to the next, with one variance and the same correlations in all segments (`segment_costs`). These are not
 known: whether a wander is noise or changes is decided by the same sum, once with the noise that fits best without any
-change, once with that which fits best with them (Shi, Gallagher, Lund, Killick 2022). For given noise the best
+change, once with that which fits best with them (Shi, Gallagher, Lund, Killick 2022). The order of the noise is 1, or
+2 if that pays log n (Schwarz 1978), as for a wander below the scatter of single recordings. For a given noise the best
 partition is exact (Jackson et al. 2005), for a given partition the noise is fitted; both in turn, from several noises.
 
 A segment has 4 recordings at least, so a recording that has not 3 others near it among its 6 next cannot be part of
@@ -31,7 +32,7 @@ FEWEST = 12  # recordings, below which their noise is not known
 SHORTEST = 4  # recordings of a segment
 PLACE = 7.35  # chi^2 within which a place is in the 95 % interval: -2 log(1 - sqrt 0.95), Siegmund 1988
 _CALIBRATED = 7.0
-_STARTS = ((0.0, 0.0), (0.5, 0.0), (0.9, 0.0))  # partial correlations to begin with
+_STARTS = tuple((first, *rest) for rest in ((), (0.0,)) for first in (0.0, 0.5, 0.9))  # partial correlations
 _TURNS = 3  # of partition and noise
 _NEAR = 3.0  # standard deviations of the noise over two recordings, within which a neighbour is near
 _BESIDE = 3  # recordings to each side that are neighbours
@@ -137,6 +138,7 @@ def _fits(
         left = sum(float(costs.of(one.first, one.last)[one.sloping]) for one in segments) + count * least
         terms = len(segments) - 1 + sum(one.sloping for one in segments)
         criterion = count * math.log(left / count) + len(segments) * costs.added + threshold * terms
+        criterion += len(costs.partial) * math.log(count)
         return _Fit(costs, segments, left / (count - len(segments) - sum(one.sloping for one in segments)), criterion)
 
     def with_its_noise(one: _Fit) -> _Fit:

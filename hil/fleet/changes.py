@@ -31,8 +31,10 @@ LOOKS = 365.0  # recordings in which one false change of an axis is expected at 
 FEWEST = 12  # recordings, below which their noise is not known
 SHORTEST = 4  # recordings of a segment
 PLACE = 7.35  # chi^2 within which a place is in the 95 % interval: -2 log(1 - sqrt 0.95), Siegmund 1988
-_CALIBRATED = 7.0
-_STARTS = tuple((first, *rest) for rest in ((), (0.0,)) for first in (0.0, 0.5, 0.9))  # partial correlations
+_STEP = math.sqrt(9.0 + PLACE)  # standard errors of a step beyond those that the best place of a slope shows
+_CALIBRATED = 9.0
+_ORDERS = (1, 2)  # of the noise
+_STARTS = (0.0, 0.5, 0.8)  # correlations to begin with
 _TURNS = 3  # of partition and noise
 _NEAR = 3.0  # standard deviations of the noise over two recordings, within which a neighbour is near
 _BESIDE = 3  # recordings to each side that are neighbours
@@ -69,8 +71,8 @@ class ChangePoint:
 
     @property
     def kind(self) -> str:
-        """`step` where the level differs by three standard errors, else `slope`."""
-        return "step" if abs(self.step) > 3.0 * self.step_error else "slope"
+        """`step` where the level differs by more than errors and the choice of the place make, else `slope`."""
+        return "step" if abs(self.step) > _STEP * self.step_error else "slope"
 
 
 @dataclass(frozen=True)
@@ -127,38 +129,37 @@ def threshold_of(quantities: int) -> float:
     return 2.0 * math.log(LOOKS * quantities) + _CALIBRATED
 
 
-def _fits(
-    day: FloatArray, values: FloatArray, scales: FloatArray, threshold: float, least: float
-) -> Iterator[_Fit]:
-    """Partitions with the noise that fits each, from several noises on: without a change first."""
+def _fits(day: FloatArray, values: FloatArray, scales: FloatArray, threshold: float, least: float) -> Iterator[_Fit]:
+    """Partitions with the noise that fits each: without a change, then from several noises on."""
     count = values.size
-    whole = [_Segment(0, count, False)]
 
-    def fit(costs: SegmentCosts, segments: list[_Segment]) -> _Fit:
-        left = sum(float(costs.of(one.first, one.last)[one.sloping]) for one in segments) + count * least
+    def fitted(segments: list[_Segment], costs: SegmentCosts, order: int) -> _Fit:
+        """A partition with the noise of this order that fits what is left of it by `costs`."""
+        left = [costs.left(*one) for one in segments]
+        costs = SegmentCosts(day, values, scales, partial_correlations(left, order))
+        chi2 = sum(float(costs.of(one.first, one.last)[one.sloping]) for one in segments) + count * least
         terms = len(segments) - 1 + sum(one.sloping for one in segments)
-        criterion = count * math.log(left / count) + len(segments) * costs.added + threshold * terms
-        criterion += len(costs.partial) * math.log(count)
-        return _Fit(costs, segments, left / (count - len(segments) - sum(one.sloping for one in segments)), criterion)
+        criterion = count * math.log(chi2 / count) + len(segments) * costs.added
+        criterion += order * math.log(count) + threshold * terms
+        return _Fit(costs, segments, chi2 / (count - 1 - terms), criterion)
 
-    def with_its_noise(one: _Fit) -> _Fit:
-        left = [one.costs.left(*each) for each in one.segments]
-        return fit(SegmentCosts(day, values, scales, partial_correlations(left, len(one.costs.partial))), one.segments)
-
+    whole = [_Segment(0, count, False)]
+    for order in _ORDERS:
+        one = fitted(whole, SegmentCosts(day, values, scales, ()), order)
+        for _ in range(_TURNS):
+            one = fitted(whole, one.costs, order)
+        yield one
     for start in _STARTS:
-        one = begin = fit(SegmentCosts(day, values, scales, start), whole)
+        costs, segments = SegmentCosts(day, values, scales, (start,)), whole
+        innovations = (values[2:] - (1.0 + start) * values[1:-1] + start * values[:-2]) / scales[1:-1]  # differences
+        variance = max(0.5 * _spread(innovations), least)
         for _ in range(_TURNS):
-            one = with_its_noise(one)
-            yield one
-        turned = (values[2:] - (1.0 + start[0]) * values[1:-1] + start[0] * values[:-2]) / scales[1:-1]
-        one = begin._replace(variance=max(0.5 * _spread(turned), least))
-        for _ in range(_TURNS):
-            found = _partition(one.costs, count, threshold, one.variance)
-            if found in (whole, one.segments):
+            found = _partition(costs, count, threshold, variance)
+            if found in (whole, segments):
                 break
-            yield fit(one.costs, found)
-            one = with_its_noise(fit(one.costs, found))
-            yield one
+            both = [fitted(found, costs, order) for order in _ORDERS]
+            yield from both
+            costs, segments, variance, _ = min(both, key=lambda one: one.criterion)
 
 
 def _partition(costs: SegmentCosts, count: int, threshold: float, variance: float) -> list[_Segment]:
@@ -167,7 +168,7 @@ def _partition(costs: SegmentCosts, count: int, threshold: float, variance: floa
     best, begins = np.full(count + 1, np.inf), np.zeros(count + 1, dtype=int)
     slopes, best[0] = np.zeros(count + 1, dtype=bool), 0.0
     for end in range(SHORTEST, count + 1):
-        level, line = costs.of(np.arange(end - SHORTEST + 1), end)
+        level, line = costs.of(slice(end - SHORTEST + 1), end)
         cost = best[: level.size] + np.minimum(level, line + price)
         at = int(np.argmin(cost))
         best[end], begins[end] = cost[at] + price + variance * costs.added, at

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 
-_MOST = 0.95  # correlation: more is a wander, which is a change
+_MOST = 0.8  # correlation: more is a wander, which is a change
+Rows = int | slice | NDArray[np.intp]
 _PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # products of the columns one, day and value
 
 
@@ -32,15 +33,15 @@ class SegmentCosts:
         self.partial = tuple(partial)
         order = len(partial)
         products = self._products(order)
-        self._sums = np.concatenate([np.zeros((1, 6)), np.cumsum(products, axis=0)])
+        self._sums = np.concatenate([np.zeros((6, 1)), np.cumsum(products, axis=1)], axis=1)
         self._first = np.zeros_like(products)  # what the first rows of a stretch that begins here add
         for row in range(order):
-            self._first[: day.size - row] += self._products(row)[row:]
-        self._first[: day.size - order] -= self._sums[order : day.size]
+            self._first[:, : day.size - row] += self._products(row)[:, row:]
+        self._first[:, : day.size - order] -= self._sums[:, order : day.size]
         self.added = -sum(at * math.log(1.0 - one**2) for at, one in enumerate(partial, 1))
 
     def _products(self, known: int) -> FloatArray:
-        """Products (n, 6) of rows of which `known` ones before are in their stretch."""
+        """Products (6, n) of rows of which `known` ones before are in their stretch."""
         weights = np.zeros(0)
         for one in self.partial[:known]:
             weights = np.append(weights - one * weights[::-1], one)
@@ -48,18 +49,21 @@ class SegmentCosts:
         for lag, weight in enumerate(weights, 1):
             rows[:, lag:] -= weight * self._rows[:, :-lag]
         share = math.prod(1.0 - one**2 for one in self.partial[known:])  # of the innovations in the variance of a row
-        return np.stack([share * rows[one] * rows[other] for one, other in _PAIRS], axis=1)
+        return np.array([share * rows[one] * rows[other] for one, other in _PAIRS])
 
-    def of(self, first: int | NDArray[np.intp], last: int | NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """chi^2 of a level, and of a line, over stretches `first` to `last` (exclusive)."""
-        one, day, days, value, both, values = (self._sums[last] + self._first[first]).T
+    def of(self, first: Rows, last: Rows) -> tuple[FloatArray, FloatArray]:
+        """chi^2 of a level, and of a line, over stretches `first` to `last` (exclusive); one of them may be many."""
+        one, day, days, value, both, values = self._of(first, last)
         level = np.maximum(values - value * value / one, 0.0)
         spread = np.maximum(days - day * day / one, 1e-300)
         return level, np.maximum(level - (both - day * value / one) ** 2 / spread, 0.0)
 
+    def _of(self, first: Rows, last: Rows) -> FloatArray:
+        return np.asarray((self._first[:, first].T + self._sums[:, last].T).T)
+
     def line(self, first: int, last: int, sloping: bool) -> "Line":
         """Fit a level, or a line, to a stretch."""
-        one, day, days, value, both, _ = map(float, self._sums[last] + self._first[first])
+        one, day, days, value, both, _ = map(float, self._of(first, last))
         spread = max(days - day * day / one, 1e-300)
         slope = (both - day * value / one) / spread if sloping else 0.0
         slope_error = 1.0 / math.sqrt(spread) if sloping else 0.0

@@ -40,6 +40,7 @@ _NEAR = 3.0  # standard deviations of the noise over two recordings, within whic
 _BESIDE = 3  # recordings to each side that are neighbours
 _MAD = 1.4826  # standard deviation over median absolute deviation of normal values
 _WINSORIZED, _KEPT = 2.0, 0.9205  # standard deviations, and the variance of normal values that are clipped there
+_BLOCK = 64  # ends of stretches whose costs are computed at once
 _LEAST = 1e-9  # of the largest value: scatter of what is always alike
 
 
@@ -167,12 +168,16 @@ def _partition(costs: SegmentCosts, count: int, threshold: float, variance: floa
     price = variance * threshold
     best, begins = np.full(count + 1, np.inf), np.zeros(count + 1, dtype=int)
     slopes, best[0] = np.zeros(count + 1, dtype=bool), 0.0
-    for end in range(SHORTEST, count + 1):
-        level, line = costs.of(slice(end - SHORTEST + 1), end)
-        cost = best[: level.size] + np.minimum(level, line + price)
-        at = int(np.argmin(cost))
-        best[end], begins[end] = cost[at] + price + variance * costs.added, at
-        slopes[end] = line[at] + price < level[at]
+    for block in range(SHORTEST, count + 1, _BLOCK):
+        ends = np.arange(block, min(block + _BLOCK, count + 1))
+        with np.errstate(all="ignore"):  # stretches that end before they begin are not read
+            level, line = costs.of(np.arange(ends[-1])[None, :], ends[:, None])
+        sloping = line + price < level
+        cost = np.where(sloping, line + price, level) + price + variance * costs.added
+        for end, of_end, slope in zip(ends, cost, sloping, strict=True):
+            total = best[: end - SHORTEST + 1] + of_end[: end - SHORTEST + 1]
+            at = int(np.argmin(total))
+            best[end], begins[end], slopes[end] = total[at], at, slope[at]
     found, end = list[_Segment](), count
     while end > 0:
         found.append(_Segment(int(begins[end]), end, bool(slopes[end])))

@@ -61,13 +61,13 @@ class SegmentCosts:
     def _of(self, first: Rows, last: Rows) -> FloatArray:
         return np.asarray((self._first[:, first].T + self._sums[:, last].T).T)
 
-    def line(self, first: int, last: int, sloping: bool) -> "Line":
+    def line(self, first: int, last: int, sloping: bool) -> "FittedLine":
         """Fit a level, or a line, to a stretch."""
         one, day, days, value, both, _ = map(float, self._of(first, last))
         spread = max(days - day * day / one, 1e-300)
         slope = (both - day * value / one) / spread if sloping else 0.0
         slope_error = 1.0 / math.sqrt(spread) if sloping else 0.0
-        return Line(
+        return FittedLine(
             day / one + self._middle[0], value / one + self._middle[1], slope, 1.0 / math.sqrt(one), slope_error
         )
 
@@ -79,7 +79,7 @@ class SegmentCosts:
         return np.asarray(value - level * one - fit.slope * day)
 
 
-class Line(NamedTuple):
+class FittedLine(NamedTuple):
     """Level at a day, slope a day, and their errors, which are independent."""
 
     day: float

@@ -67,9 +67,13 @@ def axis_page(trend: AxisTrend, diagnoses: Sequence[Row]) -> bytes:
             "The inertia of the axis is fitted once over its first recordings and held; friction, lost motion, lead "
             "error, stiffness and delays are linear regressions over each recording, with standard errors of a "
             "jackknife over blocks of rows.",
-            "Changes are found by optimal partitioning into levels and lines. Errors of each recording and the scatter "
-            "between recordings count. The threshold is such that at one recording a day at most one false change a "
-            "year is expected in all quantities of an axis together.",
+            "Changes are found by optimal partitioning into levels and lines, with a likelihood that decides between "
+            "changes and correlated noise. A recording far from all that are next to it counts for no change; four at "
+            "another level do. The threshold is such that at one recording a day at most one false change a year is "
+            "expected in all quantities of an axis together.",
+            "Assumed is noise whose correlation from one recording to the next is 0.8 at most: a slower wander, as of "
+            "the season, counts as change. Until some 40 recordings a step below three times the scatter in their "
+            "middle may be taken for such noise.",
             "The reversal difference holds play and the windup by friction at the table; the stiffness rests on the "
             "mass at the table as the bench file has it: its changes are measured, its level is as right as that mass.",
         ]

@@ -123,8 +123,11 @@ def do(
             "mix: install the same there and run the same again to go on"
         )
     os.environ.setdefault("HIL_THREADS", "1")  # others work on this machine too
-    rows = []
+    rows = list[Row]()
     for item in batch:
+        if (row := results.part(stage, item.id)) is not None:  # of a worker that was ended within this task
+            rows.append(row)
+            continue
         try:
             row = _row(item, GOOD, "") | work(item)
         except HilError as error:

@@ -23,7 +23,7 @@ from hil.fleet.store import Row, Store, StoredFile
 from hil.fleet.work import diagnose_one, fit_axis, look_at, tell_condition, watch_axis
 
 METHOD = "1"  # of the quantities; another one makes them anew
-PAGES = "1"  # of the trends and their pages; another one makes them anew
+PAGES = "2"  # of the trends and their pages; another one makes them anew
 INDEX, CONSTANTS, CONDITION, DIAGNOSES, TRENDS = "index", "constants", "condition", "diagnosed", "trends"
 PAGE = "fleet.html"
 _NUMBER, _TEXT = pa.float64(), pa.string()

@@ -24,6 +24,11 @@ from hil.errors import InputError
 
 RESULTS = "_fleet"  # within the folder of the fleet, unless another place is given
 Row = dict[str, Any]
+# what file systems call the moment or the version of a file: S3, GCS, Azure, SFTP and local, FTP, WebDAV and WebHDFS
+_STAMPS = (
+    *("ETag", "etag", "mtime", "LastModified", "last_modified"),
+    *("updated", "modify", "modified", "modificationTime", "created"),
+)
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,7 @@ class Store:
             name = path[len(root) :].lstrip("/")
             if any(part.startswith((".", "_")) for part in PurePosixPath(name).parts):
                 continue
-            stamps = (info.get(key) for key in ("ETag", "etag", "mtime", "LastModified", "last_modified", "created"))
+            stamps = (info.get(key) for key in _STAMPS)
             found.append(StoredFile(name, int(info.get("size") or 0), str(next((one for one in stamps if one), ""))))
         return sorted(found, key=lambda one: one.file)
 
@@ -139,12 +144,17 @@ class Store:
         text = json.dumps(row, ensure_ascii=False, allow_nan=False)
         self.write(f"parts/{stage}/{row['id']}.json", text.encode())
 
+    def part(self, stage: str, identity: str) -> Row | None:
+        """Result of one recording that no dataset has yet; None if there is none."""
+        content = self.read(f"parts/{stage}/{identity}.json")
+        return None if content is None else dict(json.loads(content))
+
     def parts(self, stage: str) -> list[Row]:
         """Results that no dataset has yet: those of a run that was ended."""
         found = []
         for name in self.names(f"parts/{stage}"):
-            if name.endswith(".json") and (content := self.read(f"parts/{stage}/{name}")) is not None:
-                found.append(json.loads(content))
+            if name.endswith(".json") and (row := self.part(stage, name.removesuffix(".json"))) is not None:
+                found.append(row)
         return found
 
     def rows(self, stage: str, axis: str | None = None) -> list[Row]:

@@ -2,7 +2,8 @@
 
 python tests/net/fleet_bars.py run FLEET        # two workers, one killed, the client killed, gone on with; memory
 python tests/net/fleet_bars.py score FLEET TRUTH.json   # after hil fleet trend: change points against the truth
-python tests/net/fleet_bars.py alarms YEARS     # false changes a year on axes that do not age, a look a day
+python tests/net/fleet_bars.py alarms YEARS     # false changes a year on axes that do not age
+python tests/net/fleet_bars.py power SERIES     # share of steps and slopes that are found
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from hil.fleet.trend import date_of
 ROOT = Path(__file__).parents[2]
 BEGIN_DAY = 20089.25  # of ageing_fleet.BEGIN, since 1970
 COUNTED = {"friction": ("coulomb_forward", "coulomb_back")}  # quantity of the truth -> those that show it
-CHECKED_EVERY = 3  # recordings between two looks of the simulation: fewer looks find no more
+CHECKED_EVERY = 10  # recordings between two looks of the simulation
 
 
 def client(fleet: Path, out: Path, workers: int, what: str = "compare") -> subprocess.Popen[str]:
@@ -160,25 +161,43 @@ def score(fleet: Path, truth: Path) -> None:
 
 def alarms(years: int) -> None:
     """Count false changes of a quantity on series of a year, looked at from the first recordings to the last."""
-    rng = np.random.default_rng(39)
-    kinds: dict[str, Callable[[int], np.ndarray]] = {
-        "white": rng.standard_normal,
-        "heavy tails (t, 4)": lambda n: rng.standard_t(4, n) / np.sqrt(2.0),
-        "correlated 0.5": lambda n: correlated(rng, n, 0.5),
-        "correlated 0.8": lambda n: correlated(rng, n, 0.8),
-        "an outlier of 8 in 33": lambda n: rng.standard_normal(n) * np.where(rng.uniform(size=n) < 0.03, 8.0, 1.0),
-    }
-    for name, draw in kinds.items():
-        found = 0
+    for name, draw in NOISES.items():
+        found, rng = 0, np.random.default_rng(39)
         for _ in range(years):
-            values, seen = draw(365), False
+            values, seen = draw(rng, 365), False
             for last in range(FEWEST, 366, CHECKED_EVERY):
-                looked = history(np.arange(last) * 1.0, values[:last], np.full(last, 0.3), len(QUANTITIES))
-                now = bool(looked and (looked.changes or looked.now.slope))
+                now = changed(values[:last])
                 found += now and not seen
                 seen = now
         of_axis = len(QUANTITIES) * found / years
         print(f"{name}: {found} in {years} years of one quantity, {of_axis:.2f} a year of an axis", flush=True)
+
+
+def power(series: int) -> None:
+    """Share of series in which a step is found, by its size in standard deviations and the recordings about it."""
+    for name in ("white", "correlated 0.5"):
+        for before, after in ((10, 10), (20, 20), (50, 4), (50, 8), (50, 50), (150, 6), (150, 15)):
+            shares = []
+            for size in (2.0, 3.0, 4.0, 6.0):
+                rng = np.random.default_rng(39)
+                drawn = (NOISES[name](rng, before + after) for _ in range(series))
+                found = [changed(one + size * (np.arange(one.size) >= before)) for one in drawn]
+                shares.append(f"{size:g}: {np.mean(found):.2f}")
+            print(f"{name}, {before} before, {after} after:", ", ".join(shares), flush=True)
+        for count in (30, 60, 120):
+            slopes = []
+            for size in (3.0, 5.0, 8.0):
+                rng = np.random.default_rng(40)
+                drawn = (NOISES[name](rng, count) for _ in range(series))
+                found = [changed(one + size * np.arange(one.size) / one.size) for one in drawn]
+                slopes.append(f"{size:g}: {np.mean(found):.2f}")
+            print(f"{name}, a slope over {count}:", ", ".join(slopes), flush=True)
+
+
+def changed(values: np.ndarray) -> bool:
+    """True if a quantity with these values at one recording a day changes."""
+    found = history(np.arange(values.size) * 1.0, values, np.full(values.size, 0.3), len(QUANTITIES))
+    return bool(found and (found.changes or found.now.slope))
 
 
 def correlated(rng: np.random.Generator, count: int, by: float) -> np.ndarray:
@@ -189,10 +208,26 @@ def correlated(rng: np.random.Generator, count: int, by: float) -> np.ndarray:
     return values
 
 
+def outliers(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Beside 0 in 97 % of the recordings, normal values of standard deviation 8 in the others (n,)."""
+    return 8.0 * rng.standard_normal(count) * (rng.uniform(size=count) < 0.03)
+
+
+NOISES: dict[str, Callable[[np.random.Generator, int], np.ndarray]] = {
+    "white": lambda rng, n: rng.standard_normal(n),
+    "heavy tails (t, 4)": lambda rng, n: rng.standard_t(4, n) / np.sqrt(2.0),
+    "outliers of 8 in 3 %": lambda rng, n: rng.standard_normal(n) + outliers(rng, n),
+    "correlated 0.5": lambda rng, n: correlated(rng, n, 0.5),
+    "correlated 0.8": lambda rng, n: correlated(rng, n, 0.8),
+    "half white, half correlated 0.8": lambda rng, n: (rng.standard_normal(n) + correlated(rng, n, 0.8)) / np.sqrt(2.0),
+    "correlated 0.8, outliers of 8 in 3 %": lambda rng, n: correlated(rng, n, 0.8) + outliers(rng, n),
+}
+
 if __name__ == "__main__":
     commands: dict[str, Callable[[Sequence[str]], None]] = {
         "run": lambda given: run(Path(given[0])),
         "score": lambda given: score(Path(given[0]), Path(given[1])),
         "alarms": lambda given: alarms(int(given[0])),
+        "power": lambda given: power(int(given[0])),
     }
     commands[sys.argv[1]](sys.argv[2:])

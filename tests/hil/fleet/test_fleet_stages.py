@@ -128,6 +128,19 @@ def test_results_of_a_client_that_was_killed_are_taken(tmp_path: Path) -> None:
     assert [row["reason"] for row in rows] == ["kept", "kept", "kept", ""]
 
 
+def test_a_task_that_is_begun_again_goes_on(tmp_path: Path) -> None:
+    """Its first worker was ended after two of three recordings."""
+    from hil.fleet.engine import _code, do
+
+    AT_WORK.clear()
+    store = Store(str(tmp_path))
+    items = [WorkItem(f"id-{at}", "axis", f"file-{at}") for at in range(3)]
+    first = do(store, "tried", note, _code(), items[:2])
+    again = do(store, "tried", note, _code(), items)
+    assert AT_WORK == ["file-0", "file-1", "file-2"]
+    assert again[:2] == first
+
+
 def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:
     from hil.fleet.engine import do
 

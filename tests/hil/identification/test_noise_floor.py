@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, dataset, evaluated, moves, recorded
 
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Mode
 from hil.diagnosis.verdict.fit_table import fit_table
 from hil.identification.dataset import prepare_dataset
@@ -88,8 +89,19 @@ def test_in_closed_loop_the_axis_moves_with_what_its_encoders_count() -> None:
     moved_m = noise_response(found.hypothesis, run)["table"]
     assert differ_m > 1.5 * axis.table_noise_m
     assert np.hypot(run.noise.table_m, moved_m) == pytest.approx(differ_m, rel=0.3)
+    # one run of a loop at its torque limit strays from its twin by far more, and its blocks do not: they are shown
     table = fit_table(found, found, found, dataset([], exact))["table_position_m"]
+    assert table.mode is Mode.BLOCKS
+    assert table.train.after_rms < CRITERIA.strays * table.train.noise_floor_rms
+
+
+def test_the_floor_in_closed_loop_has_the_answer_of_the_axis_to_its_sensors() -> None:
+    owner = bench()
+    run = take(recorded(owner), owner)
+    found = evaluated(Hypothesis(owner), prepare_dataset([run], owner))
+    table = fit_table(found, found, found, dataset([], owner))["table_position_m"]
     assert table.mode is Mode.CLOSED_LOOP
+    moved_m = noise_response(found.hypothesis, run)["table"]
     assert table.train.noise_floor_rms == pytest.approx(np.hypot(run.noise.table_m, moved_m))
 
 

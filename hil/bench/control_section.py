@@ -14,6 +14,7 @@ from hil.errors import FieldError
 
 _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
 UNKNOWN = "unknown"
+MOST_TORQUE_DELAY_S = 0.2  # either way
 
 # a period in milliseconds is refused
 Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="period of the loop [s]")]
@@ -127,7 +128,10 @@ class UnknownControl(BenchSection):
     law: Literal["unknown"]
     velocity_period_s: Period | None = Field(None, description="absent: the period of the recording")
     torque_delay_s: float | None = Field(
-        None, ge=-0.2, le=0.2, description="recorded torque acts so late; estimated from this value; absent: 0 [s]"
+        None,
+        ge=-MOST_TORQUE_DELAY_S,
+        le=MOST_TORQUE_DELAY_S,
+        description="recorded torque acts so late; estimated from this value; absent: 0 [s]",
     )
     position_feedback: Literal["motor", "table"] = Field("motor", description="encoder of the position loop")
     torque_limit_n_m: Positive | None = Field(None, description="limit of the torque command; absent: none")

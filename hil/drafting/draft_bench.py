@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 from math import hypot, log2, pi, sqrt
 
+from hil.bench.control_section import MOST_TORQUE_DELAY_S
 from hil.channels import AxisKind
 from hil.drafting.bench_notes import bench_notes
 from hil.drafting.bench_value import BenchValue
@@ -109,6 +110,8 @@ def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None
     early = plant.early_s
     way = f"{digits(1e3 * abs(early.value))} ms {'late' if early.value < 0.0 else 'early'}"
     delay_s = early.value - 0.5 * recording.period_s
+    if abs(delay_s) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
+        return None
     return BenchValue(
         "torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", f"the torque is recorded {way}, and held for a row"
     )

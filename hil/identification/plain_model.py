@@ -217,7 +217,7 @@ def fit_plain_model(
 
     best, early_rows = structure(0.0), 0.0
     # half the shortest window and a row: so far about a sliding row the axis moves the same way
-    most = min(window_rows(one.period_s) // 2 + 1 for one, _ in used)
+    most = min(min(one.window, window_rows(one.period_s)) // 2 + 1 for one, _ in used)
     for _ in range(8):
         timed = fitted(stacked(best.names, early_rows, best))
         early_rows = float(np.clip(early_rows + timed[_LOGGED].value, -most, most))

@@ -58,17 +58,17 @@ def described(lines: Sequence[str], names: Sequence[str], of_units: bool = False
         told = {name: _words_and_unit(line[begin:end]) for (_, begin, name), end in zip(places, ends, strict=False)}
         if len(told) > (0 if of_units else 1) and sum(bool(unit) for _, unit in told.values()) > len(told) / 2:
             return told
-    each = {name: one for name in names if name for line in lines if (one := _of_one(line, name))}
+    each = {name: one for name in names if name for line in lines if (one := _of_one(line, name, names))}
     return each if len(each) > 1 else {}
 
 
-def _of_one(line: str, name: str) -> tuple[str, str] | None:
+def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | None:
     """Words and unit of a line that begins with a column's name, or ends with it and a unit.
 
     "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"; "COL 3  POS.ACT  mm".
     """
-    last = re.search(rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+[\[({{]?([^\s\])}}]+)[\])}}]?\s*$", line)
-    if last and unit_named(last[1]):
+    last = re.search(rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+[\[({{]?([^\s;,|\])}}]+)[\])}}]?\s*$", line)
+    if last and unit_named(last[1]) and last[1] not in names:  # else it is a header, of t, n and m
         return "", last[1]
     match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
     if match is None:

@@ -29,6 +29,7 @@ from hil.diagnosis.structure_left import TORQUE, channels, least_energy, left_in
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.laps import Laps
 from hil.identification.noise_apart import smoothed_runs
 from hil.identification.parallel import in_parallel
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
@@ -73,7 +74,8 @@ def chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> flo
         if not np.isfinite(shape).all():
             continue
         beside = own.beside[:, ~own.constant] if offset else own.beside
-        size, ratio, free = _first_coefficient(np.column_stack([shape, beside]), own.measured, own.rows)
+        matrix, laps = np.column_stack([shape, beside]), [run.laps for run in without.data.runs]
+        size, ratio, free = _first_coefficient(matrix, own.measured, own.rows, laps)
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             if fitted:
                 removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
@@ -181,13 +183,14 @@ def _searched(found: Hypothesis) -> float:
 
 
 def _first_coefficient(
-    matrix: FloatArray, signal: FloatArray, rows: Sequence[NDArray[np.bool_]]
+    matrix: FloatArray, signal: FloatArray, rows: Sequence[NDArray[np.bool_]], laps: Sequence[Laps | None]
 ) -> tuple[float, float, float]:
     """Coefficient of the first column (n, p), the same over its error, and the degrees of freedom; 0 where not told.
 
     Generalised least squares: both sides are whitened by the autoregressive model of what the columns leave, so that
     slow errors do not hide a shape that is faster. The error counts what is correlated still (D. W. K. Andrews and J.
-    C. Monahan, Econometrica 60 (1992) 953); rows (m,) of each run count.
+    C. Monahan, Econometrica 60 (1992) 953), and what repeats from lap to lap, as the counts of an encoder do: a lap
+    tells it no better than one. Rows (m,) of each run count.
     """
     whole = np.column_stack([signal, matrix])
     taps = _whitening(whole, rows)
@@ -210,11 +213,27 @@ def _first_coefficient(
         products = np.fft.irfft(np.abs(np.fft.rfft(_spread(weight, at), size)) ** 2, size)[: covariance.size]
         lags = covariance[: products.size]
         variance += float(lags[0] * products[0] + 2.0 * lags[1:] @ products[1 : lags.size])
-    total = max(float(covariance[0] + 2.0 * covariance[1:].sum()), float(covariance[0]))
+    repeated = 1.0 + _repeated(parts, np.split(weights[0], splits), laps) / variance if variance > 0.0 else 1.0
+    variance *= repeated
+    total = repeated * max(float(covariance[0] + 2.0 * covariance[1:].sum()), float(covariance[0]))
     free = signal.size * float(covariance[0]) / total - matrix.shape[1] if total > 0.0 else 0.0
     if not (variance > 0.0 and free > 0.0):
         return 0.0, 0.0, 0.0
     return float(solved[0] / scale[0]) if scale[0] > 0.0 else 0.0, float(solved[0]) / variance**0.5, free
+
+
+def _repeated(parts: Sequence[ResidualSeries], weights: Sequence[FloatArray], laps: Sequence[Laps | None]) -> float:
+    """Variance that a sum of residuals with weights (m,) of the rows has because these repeat from lap to lap."""
+    found = 0.0
+    for part, weight, of in zip(parts, weights, laps, strict=True):
+        if of is None:
+            continue
+        both = part.rows[of.first] & part.rows[of.again]
+        first, again, series = of.first[both], of.again[both], _spread(weight, part.rows)
+        if first.size:
+            alike = max(float(np.mean(part.left[first] * part.left[again])), 0.0)
+            found += 2.0 * alike * max(float(series[first] @ series[again]), 0.0)
+    return found
 
 
 def _whitening(whole: FloatArray, rows: Sequence[NDArray[np.bool_]]) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
 
@@ -12,8 +13,9 @@ from hil.bench.control_section import UnknownControl
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import chance_below_noise, chance_of_shape, shown
+from hil.diagnosis.search.shape import _first_coefficient, chance_below_noise, chance_of_shape, shown
 from hil.identification.estimator import Fit
+from hil.identification.laps import Laps
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 
@@ -57,3 +59,20 @@ def test_a_delay_or_a_resonance_that_passes_less_noise_is_not_told() -> None:
         chance = chance_below_noise(begun, without)
         assert chance is not None
         assert chance > NEEDED
+
+
+def test_noise_that_repeats_from_lap_to_lap_tells_no_more_than_one_lap() -> None:
+    rng, lap, rows = np.random.default_rng(5), 1200, np.ones(2400, dtype=bool)
+    laps = Laps(np.arange(lap), np.arange(lap) + lap)
+    shape = np.tile(np.sin(0.05 * np.arange(lap)), 2)
+    matrix = np.column_stack([shape, np.ones(2 * lap)])
+    ratios = {"repeats": list[float](), "not told": list[float](), "does not": list[float]()}
+    for _ in range(120):
+        same, other = np.tile(rng.standard_normal(lap), 2), rng.standard_normal(2 * lap)
+        ratios["repeats"].append(_first_coefficient(matrix, same, [rows], [laps])[1])
+        ratios["not told"].append(_first_coefficient(matrix, same, [rows], [None])[1])
+        ratios["does not"].append(_first_coefficient(matrix, other, [rows], [laps])[1])
+    spread = {name: float(np.std(values)) for name, values in ratios.items()}
+    assert spread["repeats"] == pytest.approx(1.0, abs=0.15)
+    assert spread["does not"] == pytest.approx(1.0, abs=0.15)
+    assert spread["not told"] > 1.25  # what the error would be wrong by

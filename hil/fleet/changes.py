@@ -139,7 +139,7 @@ def _fits(day: FloatArray, values: FloatArray, scales: FloatArray, threshold: fl
     count = values.size
 
     def fitted(segments: list[_Segment], costs: SegmentCosts, order: int) -> _Fit:
-        """A partition with the noise of this order that fits what is left of it by `costs`."""
+        """Fit the noise of this order to the residuals of a partition; `costs` gave these residuals."""
         left = [costs.left(*one) for one in segments]
         costs = SegmentCosts(day, values, scales, partial_correlations(left, order))
         chi2 = sum(float(costs.of(one.first, one.last)[one.sloping]) for one in segments) + count * least

@@ -72,7 +72,7 @@ class SegmentCosts:
         )
 
     def left(self, first: int, last: int, sloping: bool) -> FloatArray:
-        """What a level or a line leaves of a stretch (m,), in units of the scales."""
+        """Residuals (m,) of a stretch about its level or its line, in units of the scales."""
         fit = self.line(first, last, sloping)
         one, day, value = self._rows[:, first:last]
         level = fit.level - self._middle[1] - fit.slope * (fit.day - self._middle[0])
@@ -98,7 +98,7 @@ class FittedLine(NamedTuple):
 
 
 def partial_correlations(left: Sequence[FloatArray], order: int) -> tuple[float, ...]:
-    """Partial correlations of what is left of stretches, by the method of Burg (1975); negative ones count as 0."""
+    """Partial correlations of the residuals of all stretches together (Burg 1975); negative ones are set to 0."""
     ahead, behind, found = list(left), list(left), list[float]()
     for _ in range(order):
         ahead, behind = [one[1:] for one in ahead], [one[:-1] for one in behind]

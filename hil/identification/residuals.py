@@ -94,14 +94,13 @@ class Residuals:
         Nonlinear Regression, 1989, 11.2). A channel with a mismatch does not bend what another one tells: the weight is
         that of the slope, 1 / sqrt(m).
         """
-        by_name: dict[str, list[FloatArray]] = {}
-        for (_, name), part in self.parts.items():
-            by_name.setdefault(name, []).append(part)
-        rows = {name: sum(part.size for part in parts) for name, parts in by_name.items()}
-        mean = {name: sum(float(part @ part) for part in parts) / max(rows[name], 1) for name, parts in by_name.items()}
-        loss = sum(rows[name] * (value if value <= 1.0 else 1.0 + float(np.log(value))) for name, value in mean.items())
+        mean = {name: one.energy / max(one.rows, 1) for name, one in self.by_channel.items()}
+        loss = sum(
+            self.by_channel[name].rows * (value if value <= 1.0 else 1.0 + float(np.log(value)))
+            for name, value in mean.items()
+        )
         weights = np.concatenate(
-            [np.full(part.size, max(mean[name], 1.0) ** -0.5) for (_, name), part in self.parts.items()]
+            [np.full(part.size, max(mean.get(name, 0.0), 1.0) ** -0.5) for (_, name), part in self.parts.items()]
         )
         return loss, weights
 

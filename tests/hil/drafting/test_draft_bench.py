@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.drafting.bench_text import bench_text
 from hil.drafting.draft_bench import draft_bench
-from hil.drafting.drafted_bench import drafted as drafted_bench
 from hil.drafting.ratio_values import gear_of, lead_of
 from hil.errors import InputError
 from hil.identification.least_squares import Estimate
@@ -156,34 +154,6 @@ def test_a_late_second_encoder_is_said(tmp_path: Path) -> None:
     note = next(note for note in draft.notes if "late" in note)
     assert float(note.split(" by ")[1].split(" ms")[0]) == pytest.approx(3.0, rel=0.05)
     assert tmp_path.exists()
-
-
-@pytest.mark.parametrize("late_rows", [1, 4, 7])
-def test_a_torque_that_is_recorded_late_is_in_the_bench(tmp_path: Path, late_rows: int) -> None:
-    torque = np.roll(SCREW["torque_Nm"], late_rows)
-    torque[:late_rows] = torque[late_rows]
-    for folder in ("late", "prompt"):
-        (tmp_path / folder).mkdir()
-    path = drafted(tmp_path / "late", SCREW | {"torque_Nm": torque})
-    bench, prompt = load_bench(path), load_bench(drafted(tmp_path / "prompt", SCREW))
-    period_s = SCREW["time_s"][1] - SCREW["time_s"][0]
-    begun_s = prompt.torque_delay_s if prompt.torque_delay_s is not None else -0.5 * period_s
-    assert bench.torque_delay_s == pytest.approx(begun_s - late_rows * period_s, abs=0.1 * period_s)
-    assert bench.axis.mass_kg == pytest.approx(prompt.axis.mass_kg, rel=0.02)
-    assert "ms late, and held for a row" in path.read_text()
-
-
-@pytest.mark.parametrize("late_rows", [-2, -1, 1, 2])
-def test_slow_rows_with_a_late_torque_make_a_valid_bench(late_rows: int) -> None:
-    time_s = 0.3 * np.arange(3000)
-    angle = 40.0 * np.sin(0.21 * time_s) + 15.0 * np.sin(0.53 * time_s)
-    speed = 8.4 * np.cos(0.21 * time_s) + 7.95 * np.cos(0.53 * time_s)
-    acceleration = -1.764 * np.sin(0.21 * time_s) - 4.2135 * np.sin(0.53 * time_s)
-    torque = np.roll(0.2 * acceleration + 0.02 * speed + 0.4 * np.sign(speed), late_rows)
-    torque += 0.002 * np.random.default_rng(4).normal(size=torque.size)
-    columns = {"motor_position_rad": angle, "torque_n_m": torque}
-    bench = drafted_bench([replace(Recording("log", columns, 0.3), metadata={"source": "log.csv"})]).bench
-    assert bench.torque_delay_s is None or abs(bench.torque_delay_s) <= 0.2
 
 
 def test_the_step_of_a_quantised_channel_is_found_and_none_in_a_smooth_one() -> None:

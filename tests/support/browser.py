@@ -27,10 +27,18 @@ class Page:
     def __init__(self, socket: ClientConnection) -> None:
         self._socket = socket
         self._number = 0
+        self._loaded: set[str] = set()
         self.errors: list[str] = []
         self.call("Runtime.enable")
         self.call("Log.enable")
         self.call("Page.enable")
+        self.call("Page.setLifecycleEventsEnabled", enabled=True)
+
+    def open(self, address: str) -> None:
+        """Go to an address and wait until it is loaded: before, the window has no document or another one."""
+        loader = self.call("Page.navigate", url=address)["loaderId"]
+        while loader not in self._loaded:
+            self._note(json.loads(self._socket.recv(timeout=DEADLINE_S)))
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Call a method of the protocol and return its result."""
@@ -82,6 +90,8 @@ class Page:
 
     def _note(self, event: dict[str, Any]) -> None:
         parameters = event.get("params", {})
+        if event.get("method") == "Page.lifecycleEvent" and parameters["name"] == "load":
+            self._loaded.add(parameters["loaderId"])
         if event.get("method") == "Runtime.exceptionThrown":
             self.errors.append(parameters["exceptionDetails"]["exception"]["description"][:300])
         if event.get("method") == "Log.entryAdded" and parameters["entry"]["level"] == "error":
@@ -97,7 +107,7 @@ def browser(profile: Path, address: str) -> Iterator[Page]:
         [
             CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0",
             "--remote-allow-origins=*", f"--user-data-dir={profile}", "--no-first-run", "--window-size=1400,1000",
-            "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", address,
+            "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "about:blank",
         ],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
@@ -111,13 +121,15 @@ def browser(profile: Path, address: str) -> Iterator[Page]:
         port = told.read_text().split()[0]
         while True:
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
-                pages = [one for one in json.load(answer) if one["type"] == "page" and one["url"] != "about:blank"]
+                pages = [one for one in json.load(answer) if one["type"] == "page"]
             if pages:
                 break
             assert time.monotonic() < end, "chromium opened no page"
             time.sleep(0.05)
         with connect(pages[0]["webSocketDebuggerUrl"], max_size=None, compression=None) as socket:
-            yield Page(socket)
+            page = Page(socket)
+            page.open(address)
+            yield page
     finally:
         process.terminate()
         process.wait(DEADLINE_S)

@@ -14,7 +14,7 @@ from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
-from hil.diagnosis.search.initial_values import claimable
+from hil.diagnosis.search.initial_values import claimable, felt_by_motor
 from hil.diagnosis.search.shape import chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
@@ -180,14 +180,16 @@ def torque_of(
 
     Without it is also the twin of the bench file, if `given`: a fit whose other parameters pay for a term is worse.
 
-    An error of the transmission is no torque on an axis without a spring. One of the motor's encoder is: a motion that
-    is read late, or wrong over the angle, needs another torque.
+    An error of the transmission is no torque on an axis without a spring, nor one of the second encoder on any: what a
+    fit leaves beside it is the matter of its other parameters. One of the motor's encoder is: a motion that is read
+    late, or wrong over the angle, needs another torque.
     """
     mechanism = BY_ID[term.effect]
-    late = mechanism.variants[term.variant].stage is Stage.CHANNEL
-    if mechanism.block is Block.CONTROLLER or (in_measured_torque(term) and not late) or term.windows:
+    variant = mechanism.variants[term.variant]
+    if mechanism.block is Block.CONTROLLER or (in_measured_torque(term) and variant.stage is not Stage.CHANNEL):
         return None
-    if mechanism.in_transmission and not fit.bench.axis.SPRINGS:
+    read = mechanism.block is Block.SENSOR and not felt_by_motor(mechanism, variant, fit.bench)
+    if read or term.windows or (mechanism.in_transmission and not fit.bench.axis.SPRINGS):
         return None
     left, other = torque_missed(fit, data), torque_missed(without, data)
     if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion

@@ -198,11 +198,16 @@ _BLOCK_OF = {"command": Block.CONTROLLER, "torque": Block.DRIVE, "motor": Block.
 
 def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
     """True if the encoders of a bench can show a variant of a mechanism."""
+    if not bench.has_table_encoder:
+        return felt_by_motor(mechanism, variant, bench)
+    return variant.observable is None or variant.observable(True)
+
+
+def felt_by_motor(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
+    """True if the motor's encoder alone can show a variant of a mechanism: it acts on the motor, or on its reading."""
     if variant.observable is not None:
-        return variant.observable(bench.has_table_encoder)
-    if bench.has_table_encoder:
-        return True
-    felt = bool(bench.axis.SPRINGS) or not mechanism.in_transmission  # by the motor, as a reaction of the table
+        return variant.observable(False)
+    felt = bool(bench.axis.SPRINGS) or not mechanism.in_transmission  # as a reaction of the table
     return felt and not mechanism.search.needs_table
 
 

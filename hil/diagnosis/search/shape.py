@@ -198,9 +198,10 @@ def _first_coefficient(
     matrix = np.column_stack(columns)
     scale = np.linalg.norm(matrix, axis=0)
     scaled = matrix / np.where(scale > 0.0, scale, 1.0)
-    weights = np.linalg.pinv(scaled, rcond=_RANK)
+    basis, upper = np.linalg.qr(scaled)  # an orthonormal basis: the singular values are those of a small matrix
+    weights = np.linalg.pinv(upper, rcond=_RANK) @ basis.T
     solved = weights @ signal
-    own = scaled[:, 0] - scaled[:, 1:] @ np.linalg.lstsq(scaled[:, 1:], scaled[:, 0], rcond=_RANK)[0]
+    own = upper[:, 0] - upper[:, 1:] @ np.linalg.lstsq(upper[:, 1:], upper[:, 0], rcond=_RANK)[0]
     if float(own @ own) < _RANK:  # the others make it
         return 0.0, 0.0, 0.0
     splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
@@ -239,7 +240,8 @@ def _repeated(parts: Sequence[ResidualSeries], weights: Sequence[FloatArray], la
 def _whitening(whole: FloatArray, rows: Sequence[NDArray[np.bool_]]) -> FloatArray:
     """Prediction-error filter (k,) of what the further columns (n, p) of a matrix leave of its first."""
     scaled = whole[:, 1:] / np.maximum(np.linalg.norm(whole[:, 1:], axis=0), 1e-300)
-    left = whole[:, 0] - scaled @ (np.linalg.pinv(scaled, rcond=_RANK) @ whole[:, 0])
+    basis, upper = np.linalg.qr(scaled)
+    left = whole[:, 0] - scaled @ (np.linalg.pinv(upper, rcond=_RANK) @ (basis.T @ whole[:, 0]))
     parts = np.split(left, np.cumsum([int(at.sum()) for at in rows])[:-1])
     covariance = autocovariance([ResidualSeries(_spread(one, at), at) for one, at in zip(parts, rows, strict=True)])
     order = min(_ORDER, covariance.size - 1)

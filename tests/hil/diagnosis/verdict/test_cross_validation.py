@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 
-from hil.bench.bench_file import Bench
+from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis.acceptance import paying
+from hil.diagnosis.search.addition import torque_of
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.identification.dataset import Dataset
@@ -58,6 +59,28 @@ def test_a_term_beside_a_refit_that_is_worse_than_the_bench_file_is_dropped(trai
     final = evaluated(nominal.hypothesis.with_term(Term("cogging_torque", 0, (0.01, 6.0, 0.0))), train)
     (dropped,) = cross_validate(nominal, final, dataset([], OWNER)).dropped
     assert "motor_position_rad" in paying(dropped.harm)
+
+
+@pytest.mark.parametrize(
+    ("term", "tells"),
+    [
+        (Term("channel_time_skew", 0, (2e-3,)), False),  # of the second encoder
+        (Term("scale_interpolation_error", 0, (1e-6, 2e-5, 0.1)), False),
+        (Term("channel_time_skew", 2, (2e-3,)), True),  # of the motor's
+        (Term("table_side_friction", 0, (0.3,)), True),
+        (Term("transport_delay", 0, (1e-3,)), False),  # the measured torque has it already
+    ],
+)
+def test_the_torque_is_no_witness_of_a_term_that_does_not_act_on_it(train: Dataset, term: Term, tells: bool) -> None:
+    """Twice the Coulomb friction, which the bench file has right, is the matter of the other parameters."""
+    owner = load_bench("reference_7dof")
+    data = train.over(train.runs)
+    given = evaluated(Hypothesis(owner), dataset(data.runs, owner))
+    x = given.hypothesis.x.copy()
+    x[[one.name for one in given.hypothesis.coordinates].index("coulomb_torque_n_m")] = np.log(2.0)
+    nominal = evaluated(given.hypothesis.moved(x), given.data)
+    final = evaluated(nominal.hypothesis.with_term(term), given.data)
+    assert (torque_of(final, nominal, term, given.data, given) is not None) == tells
 
 
 def test_the_rival_that_training_does_not_tell_from_a_refuted_term_takes_its_place() -> None:

@@ -1,4 +1,8 @@
-"""Figure of a delay or a lag: cross-correlation of a signal with the one it follows, and both at a fast change."""
+"""Figure of a delay or a lag: a signal behind the one that it follows.
+
+Cross-correlation over the lag; the difference from the twin over the rate, on which a delay is a line with its size as
+slope; and both signals at the fastest change.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,10 @@ from matplotlib.axes import Axes
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
-from hil.diagnosis.pictures.view import Captioned, View, around, longest
+from hil.diagnosis.pictures.fitted_law import FittedRows, bin_edges, means
+from hil.diagnosis.pictures.view import Captioned, View, around, longest, unit_of_channel
+from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
-from hil.figures.panels import NOISE
 from hil.identification.derivatives import motion
 from hil.identification.terms import Term
 from hil.quantities import reading_unit
@@ -25,7 +30,7 @@ SMOOTH_S = 0.005  # of the rates: both signals pass the same filter
 LEAST_S, SHOWN = 4e-3, 4.0  # shown lags on either side: at least, and in units of the delay
 FINER = 8  # lags of a curve between two rows
 STEEPEST_S = 0.03  # shown on either side of the fastest change
-BAND = 2.6  # standard errors of a band that chance leaves in 1 % of the lags
+BINS = 16  # of the rate
 
 
 class Pair(NamedTuple):
@@ -50,29 +55,46 @@ class Correlation(NamedTuple):
 
 
 def cross_correlation(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
-    """Draw the cross-correlation of the rates of two signals over the lag, what the twin leaves of it, and a change."""
+    """Draw the cross-correlation of the rates of two signals, the difference from the twin over the rate, a change."""
     view = longest(views)
     pair = _pair(diagnosis, view)
     found, fine = (correlation(pair, view, finer) for finer in (1, FINER))
     figure = Drawing(WIDTH_IN, 6.0)
-    mosaic = figure.subplot_mosaic([["peak", "left"], ["change", "change"]])
+    mosaic = figure.subplot_mosaic([["peak", "rate"], ["change", "change"]])
     factor, unit = reading_unit("s", float(found.lag_s[-1]))
     looks.twin(mosaic["peak"], factor * fine.lag_s, fine.before, "before")
     looks.twin(mosaic["peak"], factor * fine.lag_s, fine.after, "after")
     looks.points(mosaic["peak"], factor * found.lag_s, found.measured, found.error)
     name, of = pair.names
     style_axis(mosaic["peak"], "cross-correlation", f"lag of {name}\nbehind {of} [{unit}]")
-    mosaic["left"].axhspan(-BAND * found.error, BAND * found.error, color=NOISE, alpha=0.35, label="99 % of chance")
-    looks.twin(mosaic["left"], factor * found.lag_s, found.measured - found.before, "before")
-    looks.twin(mosaic["left"], factor * found.lag_s, found.measured - found.after, "after")
-    style_axis(mosaic["left"], "measured - twin", f"lag [{unit}]")
-    _change(mosaic["change"], pair, view)
+    turns = diagnosis.given_bench.axis.turns
+    _over_rate(mosaic["rate"], pair, view, turns)
+    _change(mosaic["change"], pair, view, turns)
     legend_outside(figure, mosaic.values(), 5)
     return Captioned(
         figure,
         f"Cross-correlation of the rate of {name} with that of {of}: a delay moves its peak, a lag bends it. Right: "
-        "what each twin leaves of it, with the band of chance. Below: both at the fastest change.",
+        "what the twin without it leaves, over the rate: a delay is a line with its size as slope. Below: both at the "
+        "fastest change.",
     )
+
+
+def _over_rate(axis: Axes, pair: Pair, view: View, turns: bool) -> None:
+    """Draw the difference from the twin over the rate of what the signal follows: a line, and the points of it."""
+    rate = motion(pair.followed, view.run.period_s, SMOOTH_S).velocity
+    used = np.zeros(rate.size, dtype=np.bool_)
+    used[view.run.evaluated] = True
+    after = pair.signal - pair.after
+    after = after - float(np.mean(after[used]))
+    slope = float(np.polyfit(rate[used], (pair.after - pair.before)[used], 1)[0])
+    rows = [FittedRows(rate, np.ones(rate.size), pair.signal - pair.before, after, used)]
+    edges = bin_edges(rows, BINS)
+    seen = means(rows, edges)
+    factor, unit = reading_unit(pair.unit, abs(slope) * float(np.abs(edges).max()))
+    to_read, per_s = speed_unit(turns) if pair.unit in ("m", "rad") else (1.0, f"{pair.unit}/s")
+    looks.law(axis, to_read * edges, factor * slope * edges)
+    looks.points(axis, to_read * seen.x, factor * (slope * seen.x + seen.after), factor * seen.error)
+    style_axis(axis, f"measured - twin [{unit}]", f"rate of {pair.names[1]} [{per_s}]")
 
 
 def correlation(pair: Pair, view: View, finer: int = 1) -> Correlation:
@@ -112,9 +134,9 @@ def _pair(diagnosis: Diagnosis, view: View) -> Pair:
     drive = diagnosis.given_bench.axis.drive_unit
     force = "force" if diagnosis.given_bench.axis.linear else "torque"
     if channel == "table":
-        ratio = diagnosis.given_bench.axis.ratio_m_rad
+        ratio, unit = diagnosis.given_bench.axis.ratio_m_rad, unit_of_channel(diagnosis, channel)
         names = "the table position", "the motor position"
-        return Pair(ratio * run.motor, run.table_m, run.table_m - before, run.table_m - after, names, "m")
+        return Pair(ratio * run.motor, run.table_m, run.table_m - before, run.table_m - after, names, unit)
     if channel == "motor":
         shown = run.torque + before
         names = f"the {force} on the motor", f"the measured {force}"
@@ -125,16 +147,16 @@ def _pair(diagnosis: Diagnosis, view: View) -> Pair:
     return Pair(followed, signal, signal - before, signal - after, names, drive)
 
 
-def _change(axis: Axes, pair: Pair, view: View) -> None:
+def _change(axis: Axes, pair: Pair, view: View, turns: bool) -> None:
     """Draw the signals at the fastest change of the one that is followed."""
     run = view.run
     signals, unit = [pair.followed, pair.signal, pair.before, pair.after], pair.unit
     rates = [motion(values, run.period_s, SMOOTH_S).velocity for values in signals]
-    if unit == "m":  # of positions the speed is shown, at its fastest change
-        signals, unit = rates, "m/s"
-        rates = [motion(values, run.period_s, SMOOTH_S).velocity for values in signals]
+    position = unit in ("m", "rad")
+    if position:  # of positions the speed is shown, at its fastest change
+        signals, rates = rates, [motion(values, run.period_s, SMOOTH_S).velocity for values in rates]
     rows = around(int(np.argmax(np.abs(rates[0])[run.evaluated])) + run.evaluated.start, run, STEEPEST_S)
-    factor, unit = reading_unit(unit, float(np.abs(signals[1][rows]).max()))
+    factor, unit = speed_unit(turns) if position else reading_unit(unit, float(np.abs(signals[1][rows]).max()))
     measured, before, after = (factor * values[rows] for values in signals[1:])
     looks.trace(axis, run.time_s[rows], measured)
     looks.twin(axis, run.time_s[rows], before, "before")

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
-from hil.diagnosis.pictures.fitted_law import FittedRows, bin_edges, means
+from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, bin_edges, means
 from hil.diagnosis.pictures.view import Captioned, View, around, longest, unit_of_channel
 from hil.diagnosis.turning import speed_unit
 from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
@@ -92,7 +92,8 @@ def _over_rate(axis: Axes, pair: Pair, view: View, turns: bool) -> None:
     seen = means(rows, edges)
     factor, unit = reading_unit(pair.unit, abs(slope) * float(np.abs(edges).max()))
     to_read, per_s = speed_unit(turns) if pair.unit in ("m", "rad") else (1.0, f"{pair.unit}/s")
-    looks.law(axis, to_read * edges, factor * slope * edges)
+    fine = np.linspace(edges[0], edges[-1], FINE)
+    looks.law(axis, to_read * fine, factor * slope * fine)
     looks.points(axis, to_read * seen.x, factor * (slope * seen.x + seen.after), factor * seen.error)
     style_axis(axis, f"measured - twin [{unit}]", f"rate of {pair.names[1]} [{per_s}]")
 

@@ -93,7 +93,7 @@ class Dependence:
         if question.by_direction:
             # a range may cover the end of one way and the begin of the other
             up = low + high >= 2.0 * question.by_direction
-            begin, moving = (question.by_direction, " moving up") if up else (0.0, " moving down")
+            begin, moving = (question.by_direction, " moving forwards") if up else (0.0, " moving backwards")
             low, high = (question.least + min(max(one - begin, 0.0), question.by_direction) for one in (low, high))
         factor, unit = reading_unit(question.unit, max(abs(low), abs(high)))
         return (

@@ -52,9 +52,9 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
     middle = 0.5 * (found.edges[:-1] + found.edges[1:])
     parts = [("", np.ones(middle.size, dtype=bool), MEASURED)]
     if turn:
-        parts = [("moving down", middle < turn, COMMAND), ("moving up", middle >= turn, MEASURED)]
+        parts = [("moving backwards", middle < turn, COMMAND), ("moving forwards", middle >= turn, MEASURED)]
     for label, rows, colour in parts:
-        x = middle[rows] - (turn if label == "moving up" else 0.0)
+        x = middle[rows] - (turn if label == "moving forwards" else 0.0)
         y, error = factor * found.means[rows], factor * found.errors[rows]
         axis.errorbar(along * x, y, error, color=colour, label=label, fmt="o-", markersize=4, capsize=3, linewidth=0.8)
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)

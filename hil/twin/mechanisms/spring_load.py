@@ -16,7 +16,9 @@ def _pull_to_rest(value: float, at: Moment, parameters: Row, memory: Row) -> flo
     return value - parameters[0] * (at.table_position_m - parameters[1])
 
 
-_NEAR_M, _NEAR = 9.0, 30.0  # or travels: a spring with a rest position farther away is a constant load
+# Travels beyond either end: no motion tells a weight from a rest position that is shifted. Of a spring with a rest
+# position farther away most of the force is constant: it is a weight, and the spring, if it is told, a term beside it.
+_NEAR = 1.0
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
@@ -28,7 +30,7 @@ def _starts(s: Scene) -> list[tuple[float, ...]]:
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
     """Check that the rest position is near the travel."""
     first_m, last_m = axis.positions_m
-    return max(first_m - values[1], values[1] - last_m) < max(_NEAR * axis.travel_m, _NEAR_M)
+    return max(first_m - values[1], values[1] - last_m) < _NEAR * axis.travel_m
 
 
 MECHANISM = Mechanism(

@@ -22,7 +22,7 @@ def test_a_spring_that_a_later_fit_moves_out_of_reach_becomes_a_load() -> None:
     lag = Term("current_loop_lag", 0, (1e-3,))
     runs = [take(recorded(OWNER, Term("constant_load", 0, (0.8,)), lag), OWNER)]
     ratio_m_rad = OWNER.axis.ratio_m_rad
-    spring = Term("spring_load", 0, (0.8 / ratio_m_rad / 8.0, -8.0))
+    spring = Term("spring_load", 0, (0.8 / ratio_m_rad / 0.08, -0.05))
     assert claimable(spring, OWNER, runs)
     found = fitted(Hypothesis(OWNER, (spring, lag)), runs)
     (out_of_reach, _) = found.terms

@@ -150,7 +150,7 @@ def test_a_weight_above_coulomb_friction_is_no_friction() -> None:
     assert claimable(Term("constant_load", 0, (3.0 * COULOMB_N_M,)), OWNER)
 
 
-@pytest.mark.parametrize(("rest_m", "spring"), [(0.4, True), (-3.0, True), (-9.5, False), (10.0, False)])
+@pytest.mark.parametrize(("rest_m", "spring"), [(0.11, True), (-0.05, True), (-0.07, False), (10.0, False)])
 def test_a_spring_that_rests_out_of_reach_is_a_load(train: Dataset, rest_m: float, spring: bool) -> None:
     """The travel is 60 mm."""
     assert claimable(Term("spring_load", 0, (20.0, rest_m)), OWNER, train.runs) is spring

@@ -207,6 +207,7 @@ class ChannelEntries:
             given = f"write the same as for {encoder}" if same else f"write {ratio:.6g} times that of {encoder}"
             if channel == "table_position_m" and not same:
                 given = f"write those per revolution of the load, or, if it is on the motor's shaft, {given[6:]}"
+                given += "; of a linear scale write counts_per_m, and above the line 'channels:' lead_m: VALUE"
             keys |= {key: size * ratio for key, size in self.unsized.items()}
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive

@@ -90,6 +90,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         unit = None
     known = lexicon()
     steps = _any(words, known.steps) and not _any(words, known.encoder)
+    if steps and quantity is Quantity.UNKNOWN:
+        quantity, unit = Quantity.POSITION, unit or "counts"
     return Label(
         column,
         quantity,

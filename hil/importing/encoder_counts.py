@@ -21,7 +21,9 @@ _USUAL = 0.003  # relative deviation from usual counts, or from a usual pair of 
 
 _SCALE = 0.01  # deviation of the count of a linear scale: the errors of a lead are below
 _WHOLE = 1e-3  # deviation from usual counts per turn: that of steps of few digits
-_LARGEST = 32  # denominator of a ratio of two encoders or steppers: 4000 counts for 3200 steps are 5/4
+# Denominator of a ratio of two encoders or steppers, 4000 counts for 3200 steps are 5/4, and deviation from it: within
+# that of whole steps any ratio would be such a fraction, and its error one of the transmission.
+_LARGEST, _FRACTION = 32, 1e-4
 _DECIMAL = 1e-3  # deviation of a step from a power of ten: of printed digits it tells nothing
 
 
@@ -80,7 +82,7 @@ def scale_count(per_m: float) -> float | None:
 def counts_ratio(ratio: float) -> float:
     """Counts of one encoder or stepper for each of another, a fraction of small numbers if it is nearly one."""
     usual = float(Fraction(ratio).limit_denominator(_LARGEST))
-    return usual if usual and abs(ratio / usual - 1.0) < _WHOLE else ratio
+    return usual if usual and abs(ratio / usual - 1.0) < _FRACTION else ratio
 
 
 def angle_unit(column: str, values: FloatArray, speeds: list[tuple[str, float]]) -> UnitChoice | None:

@@ -54,11 +54,11 @@ def motors_encoder(
 
 
 def follows_steps(command: FloatArray, measured: FloatArray, named: bool) -> bool:
-    """True if an encoder `measured` (n,) follows the steps of a stepper's `command` (n,), which are whole numbers.
+    """True if an encoder `measured` (n,) follows the steps of a stepper's `command` (n,).
 
-    Names that do not say steps need counts of the encoder: a servo drive gives its set-points in these, one for one,
-    which is no stepper.
+    Names that do not say steps (`named`) need whole numbers, and counts of the encoder: a servo drive gives its
+    set-points in these, one for one, which is no stepper.
     """
     relation = proportional(measured, command)
-    follows = are_counts(command) and relation.share > SAME_POSITION
-    return follows and (named or (are_counts(measured) and abs(abs(relation.factor) - 1.0) > MATCH))
+    counted = are_counts(command) and are_counts(measured) and abs(abs(relation.factor) - 1.0) > MATCH
+    return relation.share > SAME_POSITION and (named or counted)

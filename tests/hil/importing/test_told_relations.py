@@ -14,6 +14,7 @@ from hil.errors import InputError, PartOfAxis
 from hil.explanation import explain
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
+from hil.importing.encoder_counts import counts_ratio
 from hil.importing.map_draft import MapDraft
 from hil.importing.own_units import take_own_units
 
@@ -105,6 +106,25 @@ def test_steps_beside_a_linear_scale_tell_all_but_the_lead(tmp_path: Path) -> No
     found = re.search(r"0\.0050\d* m .* per revolution of the motor.*, ([\d.]+) ms late", look[2])
     assert found, look
     assert float(found[1]) == pytest.approx(1e3 * late, abs=0.2)
+
+
+def test_steps_are_known_by_name_though_uneven_stamps_make_them_no_whole_numbers(tmp_path: Path) -> None:
+    """Channels are interpolated to a regular clock before their relations are told."""
+    uneven = T + np.random.default_rng(1).uniform(-3e-4, 3e-4, T.size)
+    angle = np.interp(uneven, T, AXIS["angle"])
+    steps, counts = (np.round(angle / (2 * np.pi) * per_rev) for per_rev in (3200, 5000))
+    columns = {"t_s": uneven, "cmd_usteps": steps, "scale_cnt": counts, "drv_temp": np.round(38 + np.sin(T), 1)}
+    draft = drafted(tmp_path / "log.csv", columns)
+    assert column_of(draft, "motor_position_rad") == "cmd_usteps"
+    assert column_of(draft, "table_position_m") == "scale_cnt"
+    assert "of a linear scale" in draft.asked[1].what
+
+
+@pytest.mark.parametrize(("ratio", "snaps"), [(1.25, True), (64 / 101, False), (1.0 / 3.0, True)])
+def test_counts_of_two_encoders_are_a_fraction_only_where_they_agree(ratio: float, snaps: bool) -> None:
+    """19/30 is 64/101 but for 0.05 %, which a diagnosis would name an error of the transmission."""
+    measured = ratio * (1.0 + 3e-6)
+    assert counts_ratio(measured) == (ratio if snaps else measured)
 
 
 def test_a_set_point_in_the_counts_of_the_encoder_is_none_of_a_stepper(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from hil.files.output import rewritten_folder, write_text
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import asked_lines, map_text
-from hil.importing.own_units import take_own_units
+from hil.importing.own_units import COUNT_AS, take_own_units
 from hil.recording.recording import Recording, read_recording
 
 # Bench, draft and diagnosis load compiled kernels and more, for which the first look must not wait.
@@ -74,6 +74,14 @@ class Explanation:
     def assumed(self) -> tuple[str, ...]:
         """What was assumed of recordings and bench, with the file in which it can be corrected."""
         return self.basis.assumed
+
+    @property
+    def unsized(self) -> dict[str, list[str]]:
+        """Channels of each map whose size nothing tells, so that their values are multiples."""
+        found: dict[str, list[str]] = {}
+        for path, channel, *_ in (one.split(": ") for one in self.assumed if COUNT_AS in one):
+            found.setdefault(path, []).append(channel)
+        return found
 
     @property
     def report(self) -> Path:

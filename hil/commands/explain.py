@@ -74,6 +74,11 @@ def explain(
         )
     for warning in (one for one in found.assumed if OUTDATED in one):
         out.print(f"{warning}.\n")
+    for path, channels in found.unsized.items():
+        out.print(
+            f"Nothing tells the size of {', '.join(channels)}: values are multiples, and names can be wrong. "
+            f"Correct {path} and call it again.\n"
+        )
     out.print(page_line(found.report))
     if show and found.report.exists():
         import webbrowser

@@ -45,8 +45,8 @@ def _below_the_noise(result: Result) -> str:
             )
     chances = [chance for one in result.findings if (chance := _chance(result, one.effect)) is not None]
     if chances:
-        what = "its shape is" if len(result.findings) == 1 else "their shapes are"
-        told.append(f"{what} there below the noise of a row ({by_chance(max(chances))})")
+        what = "its shape" if len(result.findings) == 1 else "each shape"
+        told.append(f"all rows together tell {what}, though it is below the noise of one ({by_chance(max(chances))})")
     text = "; ".join(told) or "without it every residual was within its noise, too"
     return f"{text[:1].upper()}{text[1:]}."
 

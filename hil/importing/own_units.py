@@ -20,6 +20,7 @@ _ONE = {
     "gain": 1.0,
 }
 _COUNTED = ("counts_per_rev", "counts_per_m")
+COUNT_AS = "its numbers count as"  # in the note on a channel of unknown size
 
 
 def take_own_units(draft: MapDraft) -> None:
@@ -39,7 +40,7 @@ def take_own_units(draft: MapDraft) -> None:
         (drafted,) = (each for each in draft.channels if each.channel == one.channel)
         drafted.entry[one.key] = value
         draft.unsure.append(
-            f"{one.channel}: its numbers count as {unit}, so that values with {unit} are multiples ({one.key}: "
+            f"{one.channel}: {COUNT_AS} {unit}, so that values with {unit} are multiples ({one.key}: "
             f"{value if one.key == 'unit' else f'{value:.9g}'}); correct it: {one.what}"
         )
     draft.asked[:] = left

@@ -20,7 +20,13 @@ def print_diagnosis(result: Result) -> None:
         for name, entry in result.fit.items()
         for figures in (entry.validate_ or entry.train,)
     ]
+    left = result.torque_left
+    if left and left.final is not None:
+        before = min((one for one in (left.owner, left.refitted) if one is not None), default=left.final)
+        rows.append(("torque not explained", percent(before), percent(left.final), ""))
     table(("rms, held out" if held_out else "rms", "before", "after", "noise floor"), rows)
+    if left and left.plain is not None:
+        out.print(f"  torque: share of its standard deviation; plain least squares leave {percent(left.plain)}")
     if result.time_budget:
         out.print(
             f"\nThe search ended with its time budget of {digits(result.time_budget.budget_s)} s before "
@@ -33,8 +39,6 @@ def print_diagnosis(result: Result) -> None:
             ("found", "size", "confidence that it is there"),
             [(named(finding), _size(finding), percent(finding.confidence)) for finding in result.findings],
         )
-    if result.torque_left:
-        out.print(f"\n{torque_line(result.torque_left)}")
     if result.not_identifiable:
         out.print(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}; no correction is given.")
     out.print(f"\n{result.statement}\n")

@@ -53,6 +53,8 @@ def test_one_command_writes_map_bench_and_page(explained: tuple[Path, str, str])
     assert printed(out, "inertia_kg_m2") == pytest.approx(INERTIA_KG_M2, rel=0.02)
     assert f"Report: {FOLDER}/report/report.html" in out
     assert "bench.yaml: masses, friction, lead, gains, encoders" in err
+    assert "Nothing tells the size" not in out
+    assert re.search(r"^torque not explained +[\d.]+ % +[\d.]+ %", out, flags=re.MULTILINE)
 
 
 def test_the_first_answer_comes_before_the_search(explained: tuple[Path, str, str]) -> None:
@@ -106,6 +108,7 @@ def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path:
     assert ran.returncode == 0, ran.stderr
     assert "torque_n_m: its numbers count as N m" in ran.stderr
     assert printed(ran.stdout, "inertia_kg_m2") == pytest.approx(10.0 * INERTIA_KG_M2, rel=0.02)
+    assert "Nothing tells the size of torque_n_m: values are multiples" in " ".join(ran.stdout.split())
     assert "its numbers count as N m" in (tmp_path / FOLDER / "report" / "report.html").read_text()
 
 

@@ -116,6 +116,7 @@ def kick(p: Any, s: Any, index: int, side: int, share: float, viscous: float, ti
     speed = s.velocity[index] / ratio
     if p.varied_friction:
         bound, offset, drag, scale = friction_law(p, speed, s.position[index], time_s)
+        bound += scale * p.load_dependent_friction.share * abs(s.torque)
         bound, offset = share * bound, share * offset
         drag = share * drag + scale * (viscous - share * p.viscous) * speed
     else:

@@ -20,7 +20,8 @@ NEED_TABLE = (
 GROUPS = {
     "varied_friction": (
         "asymmetric_friction", "stribeck_friction", "position_dependent_friction", "nonlinear_viscous_friction",
-        "friction_drift", "friction_gradient", "local_friction", "novel_friction_bump", "novel_friction_wander",
+        "friction_drift", "friction_gradient", "load_dependent_friction", "local_friction",
+        "novel_friction_bump", "novel_friction_wander",
     ),
     "varied_nut": ("backlash", "preload_loss", "position_dependent_stiffness"),
     "lead_errors": ("periodic_lead_error", "cumulative_lead_error", "thermal_growth", "novel_pitch_bump"),

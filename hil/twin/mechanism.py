@@ -72,6 +72,7 @@ class Moment(NamedTuple):
     table_position_m: float
     ratio_m: float  # m of the table per unit of the motor
     viscous_speed: float  # of the motor, at which viscous friction equals Coulomb friction; 0: there is none
+    torque: float = 0.0  # that the motor makes, for friction
 
 
 class Contact(StrEnum):

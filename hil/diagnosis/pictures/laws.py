@@ -100,6 +100,12 @@ SCALE = Abscissa(lambda d, view: view.run.table_m - view.before["table"], "posit
 TIME = Abscissa(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
 COMMAND = Abscissa(lambda d, view: view.run.torque_command, "torque command", _drive)
 
+LOAD = Abscissa(lambda d, view: view.run.torque, "torque of the motor", _drive)
+
+
+def _against_motion(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return -np.sign(view.torque.velocity)
+
 
 def _friction(diagnosis: Diagnosis, view: View) -> FloatArray:
     """Friction (n,) of the axis against the motion, as a torque."""
@@ -213,6 +219,9 @@ LAWS: dict[Picture, DrawnLaw] = {
         "1",
         carrier=_coulomb,
         period=_period,
+    ),
+    Picture.FRICTION_OVER_LOAD: DrawnLaw(
+        LOAD, lambda term, d, x: _at(term, d, torque=x), "friction, change", carrier=_against_motion
     ),
     Picture.FRICTION_OVER_TIME: DrawnLaw(
         TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction

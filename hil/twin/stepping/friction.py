@@ -13,8 +13,8 @@ _rigid, _elastic, _slipping = contact.rigid, contact.elastic, contact.slipping
 
 
 @njit(**COMPILE)
-def _at_speed(at, speed):  # type: ignore[no-untyped-def]
-    """Change the speed of a moment."""
+def under(at, torque, speed):  # type: ignore[no-untyped-def]
+    """Change torque and speed of a moment."""
     return Moment(
         at.time_s,
         at.within_s,
@@ -25,6 +25,7 @@ def _at_speed(at, speed):  # type: ignore[no-untyped-def]
         at.table_position_m,
         at.ratio_m,
         at.viscous_speed,
+        torque,
     )
 
 
@@ -62,7 +63,7 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
     bound, opposing = _level(c, scale, at, effects)
     if effects.codes.coulomb or effects.codes.drag:  # at the middle of the step friction over speed is second order
         met = _rigid(free, gain, Resistance(rest * bound, viscous, shift, rest * opposing))
-        bound, opposing = _level(c, scale, _at_speed(at, 0.5 * (motion.speed + free - gain * met)), effects)
+        bound, opposing = _level(c, scale, under(at, at.torque, 0.5 * (motion.speed + free - gain * met)), effects)
     resistance = Resistance(rest * bound, viscous, shift, rest * opposing)
     motor = _contact(c.slips, free, gain, resistance, rest * stiffness, own.motor_contact, at.step_s, motion.speed)
     guide = 0.0
@@ -71,7 +72,7 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
         if effects.codes.drag:  # at the table's own speed: at the motor's it would drive a table that swings
             guide = _rigid(met, gain, Resistance(share * bound, guide_viscous, 0.0, 0.0))
             speed = 0.5 * (motion.table_speed + met - gain * guide)
-            opposing = scale * _drag(0.0, _at_speed(at, speed), effects)
+            opposing = scale * _drag(0.0, under(at, at.torque, speed), effects)
         # a torque that differs by direction, alike at every speed, is a load and stays on the motor
         resistance = Resistance(share * bound, guide_viscous, 0.0, share * opposing)
         guide = _contact(

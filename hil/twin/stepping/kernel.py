@@ -13,6 +13,7 @@ from hil.twin.stepping import stages
 from hil.twin.stepping.contact import COMPILE, Resistance
 from hil.twin.stepping.contact import rigid as _rigid
 from hil.twin.stepping.friction import friction as _friction
+from hil.twin.stepping.friction import under as _under
 from hil.twin.stepping.records import coupling_of, shapes_of, step_of
 from hil.twin.stepping.transmission import AxisMotion, along, follow, moment
 from hil.twin.stepping.transmission import transmit as _transmit
@@ -109,11 +110,13 @@ def advance(command, constants, modes, values, codes, delta, memory):  # type: i
             table_m = (motion.table + 0.5 * h * motion.table_speed) * c.ratio
             at = moment(c, own.clock + j * h, j * h, h, middle, motion.speed, table_m)
             made = _current(command, at, effects)
-            drive = _motor_torque(_torque(made, at, effects), at, effects)
+            turned = _torque(made, at, effects)
+            drive = _motor_torque(turned, at, effects)
             push = _table_force(own.push, at, effects) * c.ratio
             force = _transmit(c, own, shapes, motion, at, effects, delta)
             free, table_free = _move(shapes, step, c.coupled, coupling, drive, push, force, delta)
-            motor, guide = _friction(c, own, internal, motion, at, effects, free, table_free)
+            loaded = _under(at, turned, motion.speed)
+            motor, guide = _friction(c, own, internal, motion, loaded, effects, free, table_free)
         else:
             free = _move_driven(shapes, step, command, delta)
             motor = _rigid(free, gain, resistance)

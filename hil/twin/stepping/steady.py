@@ -10,6 +10,7 @@ from numba import njit
 
 from hil.twin.stepping import stages
 from hil.twin.stepping.contact import COMPILE
+from hil.twin.stepping.friction import under
 from hil.twin.stepping.kernel import read
 from hil.twin.stepping.records import shapes_of
 from hil.twin.stepping.static_equilibrium import settle
@@ -35,10 +36,16 @@ def steady(positions, speed, time_s, constants, modes, values, codes, memory):  
         scale = max(_scale(1.0, at, effects), 0.0)
         share = _share(0.0, at, effects)
         viscous_share = _viscous_share(share, at, effects)
-        sliding = scale * (sign * max(_coulomb(c.coulomb, at, effects), 0.0) + _drag(0.0, at, effects))
         viscous = scale * c.viscous * speed
+        moved = _bias(0.0, at, effects) + viscous - _table_force(0.0, at, effects) * c.ratio
+        goal = sliding = 0.0
+        for _ in range(INVERSIONS):  # friction may grow with the torque that it is part of
+            before, loaded = goal, under(at, goal, speed)
+            sliding = scale * (sign * max(_coulomb(c.coulomb, loaded, effects), 0.0) + _drag(0.0, loaded, effects))
+            goal = moved + sliding
+            if abs(goal - before) <= INVERTED * abs(goal):
+                break
         on_table[k] = share * sliding + viscous_share * viscous
-        goal = _bias(0.0, at, effects) + sliding + viscous - _table_force(0.0, at, effects) * c.ratio
         command = goal
         for _ in range(INVERSIONS):
             own.mechanisms[:] = 0.0

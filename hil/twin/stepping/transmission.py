@@ -48,7 +48,7 @@ def along(shape, values):  # type: ignore[no-untyped-def]
 def moment(c, time, within, step, position, speed, table_m):  # type: ignore[no-untyped-def]
     """Present state of the axis for the contributions; `position` in motor units."""
     angle = position * c.angle_per_unit
-    return Moment(time, within, c.period, step, angle, speed, table_m, c.ratio, c.viscous_speed)
+    return Moment(time, within, c.period, step, angle, speed, table_m, c.ratio, c.viscous_speed, 0.0)
 
 
 @njit(_nrt=False, forceinline=True, **COMPILE)

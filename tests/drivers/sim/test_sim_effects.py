@@ -52,6 +52,7 @@ SHOWN = {
     "end_stop": {"stiffness_n_m": 1e5, "edge_m": 0.02},
     "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
     "friction_gradient": {"slope_1_m": 3.0},
+    "load_dependent_friction": {"share": 0.2},
     "local_friction": {"fraction": 0.5, "begin_m": 0.01, "end_m": 0.03, "flank_m": 2e-3},
 }
 EFFECTS = {name: Effect(name, parameters) for name, parameters in SHOWN.items()}
@@ -70,7 +71,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 35
+    assert len(CATALOGUE) == 36
 
 
 @pytest.mark.parametrize("name", SHOWN)

@@ -103,6 +103,18 @@ def test_local_friction_is_a_zone_with_straight_flanks() -> None:
         assert friction_n_m(effect, 10.0, x) == pytest.approx(1.1 * (1.0 + 0.4 * share) + 0.064)
 
 
+@pytest.mark.parametrize(("torque_n_m", "way"), [(3.87, 0), (3.88, 1), (0.76, 0), (0.74, -1)])
+def test_load_dependent_friction_holds_a_weight_the_better_the_more_torque_it_takes(
+    torque_n_m: float, way: int
+) -> None:
+    """T - 2 = +-(1.1 + 0.2 T) at the limits."""
+    load = Effect("constant_load", {"load_torque_n_m": 2.0})
+    plant = plant_with(AXIS, load, Effect("load_dependent_friction", {"share": 0.2}))
+    plant.advance(torque_n_m, 0.2)
+    assert (abs(plant.motor_true_rad) > 1e-4) is (way != 0)  # the torque rises within the first step
+    assert way == 0 or np.sign(plant.motor_true_rad) == way
+
+
 def test_nonlinear_viscous_friction_is_odd_and_quadratic() -> None:
     effect = Effect("nonlinear_viscous_friction", {"quadratic_n_m_s2_rad2": 1e-5})
     for speed in (200.0, -200.0):

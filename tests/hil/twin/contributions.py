@@ -23,6 +23,7 @@ moments = st.builds(
     table_position_m=st.floats(-2.0, 2.0),
     ratio_m=st.sampled_from([RATIO_M, 1.0]),
     viscous_speed=st.sampled_from([0.0, 0.05, 160.0]),
+    torque=st.floats(-20.0, 20.0),
 )
 
 

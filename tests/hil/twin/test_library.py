@@ -29,6 +29,7 @@ TABLE = {
     "presliding_hysteresis": ("motor_side", ["stiffness_n_m_rad"]),
     "position_dependent_friction": ("motor_side", ["fraction", "period_m"]),
     "friction_gradient": ("motor_side", ["slope_1_m"]),
+    "load_dependent_friction": ("motor_side", ["share"]),
     "local_friction": ("motor_side", ["fraction", "begin_m", "end_m", "flank_m"]),
     "nonlinear_viscous_friction": ("motor_side", ["quadratic_n_m_s2_rad2"]),
     "friction_drift": ("motor_side", ["fraction", "time_constant_s"]),

@@ -133,6 +133,12 @@ def test_a_friction_gradient_is_straight_and_never_pushes(level, slope, position
     assert found == pytest.approx(max(level * (1.0 + slope * position), 0.0), abs=1e-9)
 
 
+@given(level=st.floats(0.1, 5.0), share=st.floats(0.0, 0.8), torque=st.floats(-20.0, 20.0))
+def test_load_dependent_friction_grows_with_the_torque_of_either_sign(level, share, torque) -> None:
+    found = call("load_dependent_friction", level, AT_REST._replace(torque=torque), share=share)
+    assert found == pytest.approx(level + share * abs(torque))
+
+
 @given(
     level=st.floats(0.1, 5.0),
     fraction=st.floats(-0.9, 5.0),

@@ -22,6 +22,7 @@ def test_a_spoken_name_has_no_unit_and_is_its_own(mechanism) -> None:
     ("effect", "names"),
     [
         ("cogging_torque", ["amplitude", "cycles", "phase"]),
+        ("load_dependent_friction", ["share"]),
         ("local_friction", ["fraction", "begin", "end", "flank"]),
         ("nonlinear_viscous_friction", ["quadratic"]),
         ("torque_constant_saturation", ["coefficient"]),

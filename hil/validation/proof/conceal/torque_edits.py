@@ -17,6 +17,7 @@ from hil.twin.mechanisms import (
     constant_load,
     external_force,
     friction_drift,
+    load_dependent_friction,
     local_friction,
     nonlinear_viscous_friction,
     stribeck_friction,
@@ -170,7 +171,10 @@ def _compressed(half: Half, rng: Rng) -> Edit:
 
 
 def _by_load(half: Half, rng: Rng) -> Edit:
-    return _added(half, np.abs(half.torque) * half.moved.direction, None)
+    torque, way = half.torque, np.sign(half.torque) * half.moved.direction
+    return Edit(
+        EditedChannel.TORQUE, lambda a: torque / (1.0 - a * way), 0.5, load_dependent_friction.MECHANISM, told=(0,)
+    )
 
 
 def _ramp(half: Half, rng: Rng) -> Edit:

@@ -16,7 +16,10 @@ from hil.validation.proof.draw.axis_kinds import Rng, any_phase, any_sign, log_u
 
 FormAndParameters = tuple[str, dict[str, float]]
 # Not drawn: what came after the first sealed proofs. The same seeds give the same cases.
-NOT_DRAWN = ("end_stop", "friction_gradient", "local_friction", "periodic_force", "table_side_viscous_friction")
+NOT_DRAWN = (
+    "end_stop", "friction_gradient", "load_dependent_friction", "local_friction", "periodic_force",
+    "table_side_viscous_friction",
+)  # fmt: skip
 # drawn axes move a table: an effect of a load that turns is not among theirs
 LIBRARY: tuple[str, ...] = tuple(name for name in CATALOGUE if not BY_ID[name].turning and name not in NOT_DRAWN)
 NEED_TABLE = frozenset(name for name in LIBRARY if BY_ID[name].search.needs_table or BY_ID[name].in_transmission)

@@ -84,11 +84,11 @@ def test_the_law_of_the_library_gives_the_recording_back(uses: dict[str, Half], 
     parameters, memory = np.array(values), np.zeros(WIDTH)
 
     def apply(inputs: np.ndarray) -> np.ndarray:
-        rows = zip(inputs, half.time_s, half.angle_rad, half.moved.velocity, half.position_m, strict=True)
+        rows = zip(inputs, half.time_s, half.angle_rad, half.moved.velocity, half.position_m, changed, strict=True)
         return np.array([
-            law(value, Moment(time_s, 0.0, period_s, period_s, angle, speed, at, half.ratio, coulomb / viscous),
+            law(value, Moment(time_s, 0.0, period_s, period_s, angle, speed, at, half.ratio, coulomb / viscous, torque),
                 parameters, memory)
-            for value, time_s, angle, speed, at in rows
+            for value, time_s, angle, speed, at, torque in rows
         ])  # fmt: skip
 
     ones = np.ones(changed.size)

@@ -49,13 +49,13 @@ def promises(shares: Mapping[str, float], channels: Mapping[str, ChannelEnergy],
 
 
 def _evidence(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.chance is not None:  # the noise of a row says nothing of thousands of rows
+    if of.log_chance is not None:  # the noise of a row says nothing of thousands of rows
         return None
     return of.evidence >= c.evidence, {"evidence": of.evidence, "needed": c.evidence}
 
 
 def _material(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.chance is not None:
+    if of.log_chance is not None:
         return None
     return of.removed >= c.material_alone, {"removed": of.removed, "needed": c.material_alone}
 
@@ -73,9 +73,9 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
 
 
 def _shape(of: Addition | Need, c: Criteria) -> Answer | None:
-    if of.chance is None:
+    if of.log_chance is None:
         return None
-    return of.chance < math.exp(-0.5 * c.evidence), {"chance": of.chance}
+    return of.log_chance < -0.5 * c.evidence, {"chance": math.exp(of.log_chance)}
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:

@@ -15,7 +15,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
 from hil.diagnosis.search.initial_values import claimable, felt_by_motor
-from hil.diagnosis.search.shape import chance_below_noise
+from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -90,9 +90,9 @@ class Addition:
         return unrepeated(self.fit.hypothesis, self.fit.data), unrepeated(self.base.hypothesis, self.base.data)
 
     @cached_property
-    def chance(self) -> float | None:
-        """Chance of the shape of the term below the noise; None above it."""
-        return chance_below_noise(self.fit, self.base)
+    def log_chance(self) -> float | None:
+        """Logarithm of the chance of the shape of the term below the noise; None above it."""
+        return log_chance_below_noise(self.fit, self.base)
 
     @cached_property
     def inside(self) -> InsideWindows | None:

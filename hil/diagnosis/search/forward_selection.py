@@ -23,7 +23,7 @@ from hil.diagnosis.search.next_term import Additions, SearchRound, first_standin
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
-from hil.diagnosis.search.shape import chance_below_noise
+from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.stages import Prepared, Progress, Searched
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -44,12 +44,12 @@ MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration
 class Need:
     """Need of a term beside all others: evidence (BIC difference), energy it removes from a channel over its noise.
 
-    `chance`: of its shape below the noise (`search.shape`); None above it.
+    `log_chance`: logarithm of the chance of its shape below the noise (`search.shape`); None above it.
     """
 
     evidence: float
     removed: float
-    chance: float | None
+    log_chance: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +252,7 @@ def _pruned(fit: Fit, reference: Fit) -> tuple[Fit, dict[Key, float], list[Consi
         pairs = in_parallel([partial(ablated, index) for index in range(len(fit.terms))])
         weakest = min(range(len(pairs)), key=lambda index: pairs[index][0])
         evidence, rest = pairs[weakest]
-        need = Need(evidence, removed(rest, fit, reference), chance_below_noise(fit, rest))
+        need = Need(evidence, removed(rest, fit, reference), log_chance_below_noise(fit, rest))
         ledger = examine(NEEDED, need, CRITERIA)
         if accepted(ledger):
             return fit, {term.key: value for term, (value, _) in zip(fit.terms, pairs, strict=True)}, pruned

@@ -103,4 +103,4 @@ def ordered(additions: Sequence[Addition]) -> list[Addition]:
 
     Of what another effect leaves, slow and large, a wrong term may remove more energy than the right one.
     """
-    return sorted(additions, key=lambda one: (one.chance or 0.0, -one.evidence))
+    return sorted(additions, key=lambda one: (one.log_chance or 0.0, -one.evidence))

@@ -6,7 +6,6 @@ is an objection to it: a reason beside its evidence.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,7 +24,6 @@ from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
 _NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
-_LEAST = 1e-300  # chance: less is no number
 ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
 
 
@@ -159,14 +157,14 @@ def _more(one: Addition, named: Addition) -> float:
 
 def _by_shape(one: Addition, named: Addition) -> bool:
     """True below the noise, where a term may only pass less noise than another."""
-    return one.chance is not None and named.chance is not None
+    return one.log_chance is not None and named.log_chance is not None
 
 
 def _evidence(named: Addition, one: Addition, margin: Callable[[Fit, Fit], float]) -> float:
     """Evidence for an explanation against another: the margin of their fits, below the noise that of their shapes."""
-    if one.chance is None or named.chance is None:
+    if one.log_chance is None or named.log_chance is None:
         return margin(named.fit, one.fit)
-    return 2.0 * math.log(max(one.chance, _LEAST) / max(named.chance, _LEAST))
+    return 2.0 * (one.log_chance - named.log_chance)
 
 
 def _refuted(evidence: float, one: Addition, named: Addition) -> bool:

@@ -10,6 +10,7 @@ Least squares on the rows that slide: `c / error` is Student's t, with an error 
 many degrees of freedom as independent rows. Thousands of rows together tell what hides in the noise of each one.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
+from scipy.special import betaln
 from scipy.stats import t as student
 
 from hil.arrays import FloatArray
@@ -46,22 +48,23 @@ _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
 _ORDER = 24  # of the autoregressive model: as that of `hil.identification.inference`
 _RIDGE = 1e-4  # of white noise in the autocovariance: a filter that takes off a hundredth of the rms is far enough
+_UNDERFLOW = 1e-290  # probability below which its floating-point number loses digits
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
-def chance_below_noise(fit: Fit, without: Fit) -> float | None:
-    """Chance of the shape of a term where the fit without it is within its noise; else None."""
-    return chance_of_shape(fit.hypothesis, without) if without.within_noise else None
+def log_chance_below_noise(fit: Fit, without: Fit) -> float | None:
+    """Logarithm of the chance of a term's shape where the fit without it is within its noise; else None."""
+    return log_chance_of_shape(fit.hypothesis, without) if without.within_noise else None
 
 
-def chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> float:
-    """Probability that chance makes the shape of one of all mechanisms in what the fit without it leaves.
+def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> float:
+    """Logarithm of the probability that chance makes the shape of one of all mechanisms in what a fit leaves without it.
 
-    By the number of values that were searched, see `_searched`. 1 where nothing tells, for less than what correct
+    By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than what correct
     simulations of one axis differ by, and for a `fitted` shape that leaves more at its own size: of the size c the term
     has 1, and removes (2 c - 1) / c^2 of what the shape removes.
     """
-    asked, best = _asked(without), 1.0
+    asked, best = _asked(without), 0.0
     if asked is None:
         return best
     added = _added(found, without)
@@ -79,11 +82,23 @@ def chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> flo
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             if fitted:
                 removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
-                chance = student.sf(abs(ratio) * removes**0.5, free)
+                chance = _log_tail(abs(ratio) * removes**0.5, free)
             else:
-                chance = 2.0 * student.sf(abs(ratio), free)
-            best = min(best, len(LIBRARY) * free**searched * float(chance))
+                chance = math.log(2.0) + _log_tail(abs(ratio), free)
+            best = min(best, math.log(len(LIBRARY)) + searched * math.log(free) + chance)
     return best
+
+
+def _log_tail(ratio: float, free: float) -> float:
+    """Logarithm of the probability that Student's t exceeds a ratio >= 0, also where that is no floating-point number.
+
+    There the first term of the incomplete beta function I_x(a, 1/2), x = free / (free + t^2), a = free / 2 (M.
+    Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.5.4), with its series as 1 / (1 - x).
+    """
+    if (tail := float(student.sf(ratio, free))) > _UNDERFLOW:
+        return math.log(tail)
+    x, a = free / (free + ratio**2), 0.5 * free
+    return float(a * math.log(x) - 0.5 * math.log1p(-x) - math.log(2.0 * a) - betaln(a, 0.5))
 
 
 def _added(found: Hypothesis, without: Fit) -> list[Term]:
@@ -272,9 +287,9 @@ def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
 
     def chance(one: Candidate) -> float:
         begun = (base.hypothesis.with_term(term) for term in (one.term, *one.others))
-        return min(chance_of_shape(start, base, fitted=False) for start in begun)
+        return min(log_chance_of_shape(start, base, fitted=False) for start in begun)
 
     _asked(base)  # once, before the jobs ask for it
     found = zip(in_parallel([partial(chance, one) for one in candidates]), candidates, strict=True)
-    level = [(least, one) for least, one in found if least < CRITERIA.significance]
+    level = [(least, one) for least, one in found if least < math.log(CRITERIA.significance)]
     return [one for _, one in sorted(level, key=lambda pair: pair[0])]

@@ -35,7 +35,7 @@ def addition(**quantities: Any) -> Any:
         "evidence": 500.0,
         "removed": 0.9,
         "explained": 0.9,
-        "chance": None,
+        "log_chance": None,
         "beside": 0,
         "unrepeated": (100.0, 100.0),
         "inside": None,
@@ -71,7 +71,7 @@ def test_every_constant_of_evidence_is_used() -> None:
         ({"removed": 0.039}, "material energy"),
         ({"explained": 0.019}, "share of the mismatch"),
         ({"explained": 0.09, "beside": 2}, "share of the mismatch"),
-        ({"chance": 1e-4, "evidence": 1e6}, "shape below the noise"),
+        ({"log_chance": math.log(1e-4), "evidence": 1e6}, "shape below the noise"),
         ({"unrepeated": (106.0, 100.0)}, "repeated laps"),
         ({"torque": (0.026, 0.02)}, "torque"),
         ({"inside": InsideWindows(0.01, 1.0, 5.0, 1.0, False)}, "constant force"),
@@ -94,7 +94,7 @@ def test_a_term_is_refuted_by_the_first_rule_that_it_fails(quantities: dict[str,
         {"removed": 0.04},
         {"explained": 0.1, "beside": 2},
         {"explained": None},  # nothing is above the noise
-        {"chance": 4e-5, "evidence": 0.0, "removed": 0.0},  # the noise of a row says nothing of thousands
+        {"log_chance": math.log(4e-5), "evidence": 0.0, "removed": 0.0},  # the noise of a row says nothing of thousands
         {"unrepeated": (105.0, 100.0)},
         {"inside": InsideWindows(0.2, 1.0, 50.0, 1.0, True)},  # one push may have any form
         {"inside": InsideWindows(0.01, 1.0, 3.9, 1.0, False)},  # as well as outside

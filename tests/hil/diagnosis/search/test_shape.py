@@ -8,12 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
+from scipy.integrate import quad
+from scipy.stats import t as student
 
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import _first_coefficient, chance_below_noise, chance_of_shape, shown
+from hil.diagnosis.search.shape import _first_coefficient, _log_tail, log_chance_below_noise, log_chance_of_shape, shown
 from hil.identification.estimator import Fit
 from hil.identification.laps import Laps
 from hil.identification.nominal_fit import fit_nominal_parameters
@@ -23,7 +25,7 @@ KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
 COGGING = Term("cogging_torque", 0, (0.05, 6.0, 0.4))
 MODE = Term("structural_mode", 0, (180.0, 0.02, 0.3))
-NEEDED = math.exp(-0.5 * CRITERIA.evidence)
+NEEDED = -0.5 * CRITERIA.evidence  # logarithm of a chance
 DELAY = Term("transport_delay", 1, (0.5 * KNOWN.gains.period_s,))
 
 
@@ -40,7 +42,7 @@ def base(*terms: Term) -> Fit:
 def test_a_shape_below_the_noise_is_told_where_it_is(terms: tuple[Term, ...], told: bool) -> None:
     without = base(*terms)
     begun = without.estimator.evaluate(without.hypothesis.with_term(COGGING))
-    assert (chance_of_shape(begun.hypothesis, without) < NEEDED) == told
+    assert (log_chance_of_shape(begun.hypothesis, without) < NEEDED) == told
     assert [one.term for one in shown(without, [Candidate(COGGING, 0.0)])] == [COGGING] * told
 
 
@@ -48,17 +50,30 @@ def test_a_shape_of_the_opposite_sign_is_told_only_before_it_is_fitted() -> None
     without = base(COGGING)
     opposite = replace(COGGING, values=(0.05, 6.0, 0.4 + math.pi))
     begun = without.estimator.evaluate(without.hypothesis.with_term(opposite))
-    assert chance_of_shape(begun.hypothesis, without) > 0.5
-    assert chance_of_shape(begun.hypothesis, without, fitted=False) < NEEDED
+    assert log_chance_of_shape(begun.hypothesis, without) > math.log(0.5)
+    assert log_chance_of_shape(begun.hypothesis, without, fitted=False) < NEEDED
 
 
 def test_a_delay_or_a_resonance_that_passes_less_noise_is_not_told() -> None:
     without = base(COGGING)
     for term in (DELAY, MODE):
         begun = without.estimator.evaluate(without.hypothesis.with_term(term))
-        chance = chance_below_noise(begun, without)
+        chance = log_chance_below_noise(begun, without)
         assert chance is not None
         assert chance > NEEDED
+
+
+@pytest.mark.parametrize("free", [3.0, 40.0, 3e3, 1e5])
+@pytest.mark.parametrize("ratio", [0.0, 2.0, 30.0, 90.0, 1e3])
+def test_the_tail_of_students_t_is_told_where_it_is_no_floating_point_number(ratio: float, free: float) -> None:
+    """So that of two clear shapes the clearer one comes first."""
+
+    def over_density(way: float) -> float:
+        return math.exp(student.logpdf(ratio + way, free) - student.logpdf(ratio, free))
+
+    width = 1.0 / max(1.0, ratio * (free + 1.0) / (free + ratio**2))
+    area = width * quad(lambda way: over_density(width * way), 0.0, math.inf, limit=400)[0]
+    assert _log_tail(ratio, free) == pytest.approx(student.logpdf(ratio, free) + math.log(area), abs=0.02)
 
 
 def test_noise_that_repeats_from_lap_to_lap_tells_no_more_than_one_lap() -> None:

@@ -7,6 +7,7 @@ linear axis N over m/s), nut forces are N.
 from math import atan, exp, pi, sin, sqrt
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 GMS_ELEMENTS = 4
@@ -54,6 +55,19 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
         w = p.novel_friction_wander
         scale *= 1.0 + w.fraction * wander(time_s / w.period_s, w.phase_rad)
     return scale * bound, scale * offset, scale * drag, scale
+
+
+@njit(cache=True)
+def loaded_bound(p: Any, bound: float, drag: float, towards: float, torque: float) -> float:
+    """Coulomb bound under the load that is carried: bound + share |torque - all friction|, by successive substitution.
+
+    `towards` has the sign of the motion, or of the one that friction prevents.
+    """
+    way = np.sign(towards)
+    level = bound
+    for _ in range(60):
+        level = bound + p.load_dependent_friction.share * abs(torque - way * level - drag)
+    return level
 
 
 @njit(cache=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from drivers.sim.contact import bristle_torque, coulomb_impulse, friction_law, lead_error, nut_force
+from drivers.sim.contact import bristle_torque, coulomb_impulse, friction_law, lead_error, loaded_bound, nut_force
 from drivers.sim.drive_path import angle_torque, drive_torque
 from drivers.sim.layout import CHANNEL_LINE, delayed, push
 from drivers.sim.sensors import motor_truth, normal, sample, table_truth
@@ -116,7 +116,9 @@ def kick(p: Any, s: Any, index: int, side: int, share: float, viscous: float, ti
     speed = s.velocity[index] / ratio
     if p.varied_friction:
         bound, offset, drag, scale = friction_law(p, speed, s.position[index], time_s)
-        bound += scale * p.load_dependent_friction.share * abs(s.torque)
+        if p.load_dependent_friction.on:
+            towards = mass * s.velocity[index] + h * (s.force[index] - drag / ratio)
+            bound = loaded_bound(p, bound, drag, towards, s.torque)
         bound, offset = share * bound, share * offset
         drag = share * drag + scale * (viscous - share * p.viscous) * speed
     else:

@@ -100,7 +100,7 @@ SCALE = Abscissa(lambda d, view: view.run.table_m - view.before["table"], "posit
 TIME = Abscissa(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
 COMMAND = Abscissa(lambda d, view: view.run.torque_command, "torque command", _drive)
 
-LOAD = Abscissa(lambda d, view: view.run.torque, "torque of the motor", _drive)
+LOAD = Abscissa(lambda d, view: view.run.torque + _friction(d, view), "torque that is carried", _drive)
 
 
 def _against_motion(diagnosis: Diagnosis, view: View) -> FloatArray:

@@ -58,7 +58,7 @@ def log_chance_below_noise(fit: Fit, without: Fit) -> float | None:
 
 
 def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> float:
-    """Logarithm of the probability that chance makes the shape of one of all mechanisms in what a fit leaves without it.
+    """Logarithm of the probability that chance makes the shape of one of all mechanisms in what a fit leaves.
 
     By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than what correct
     simulations of one axis differ by, and for a `fitted` shape that leaves more at its own size: of the size c the term

@@ -171,10 +171,9 @@ def _compressed(half: Half, rng: Rng) -> Edit:
 
 
 def _by_load(half: Half, rng: Rng) -> Edit:
-    torque, way = half.torque, np.sign(half.torque) * half.moved.direction
-    return Edit(
-        EditedChannel.TORQUE, lambda a: torque / (1.0 - a * way), 0.5, load_dependent_friction.MECHANISM, told=(0,)
-    )
+    coulomb, viscous = half.plain["coulomb"].value, max(half.plain["viscous"].value, 0.0)
+    load = half.torque - coulomb * half.moved.direction - viscous * half.moved.velocity
+    return _added(half, np.abs(load) * half.moved.direction, load_dependent_friction.MECHANISM, 0.8, told=(0,))
 
 
 def _ramp(half: Half, rng: Rng) -> Edit:

@@ -14,7 +14,7 @@ from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
-from hil.diagnosis.search.initial_values import claimable, felt_by_motor
+from hil.diagnosis.search.initial_values import claimable, reads_wrong
 from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
@@ -188,8 +188,7 @@ def torque_of(
     variant = mechanism.variants[term.variant]
     if mechanism.block is Block.CONTROLLER or (in_measured_torque(term) and variant.stage is not Stage.CHANNEL):
         return None
-    read = mechanism.block is Block.SENSOR and not felt_by_motor(mechanism, variant, fit.bench)
-    if read or term.windows or (mechanism.in_transmission and not fit.bench.axis.SPRINGS):
+    if reads_wrong(term, fit.bench) or term.windows or (mechanism.in_transmission and not fit.bench.axis.SPRINGS):
         return None
     left, other = torque_missed(fit, data), torque_missed(without, data)
     if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion

@@ -211,6 +211,12 @@ def felt_by_motor(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
     return felt and not mechanism.search.needs_table
 
 
+def reads_wrong(term: Term, bench: Bench) -> bool:
+    """True for an error of the second encoder's reading: nothing else of the axis changes with it."""
+    mechanism = BY_ID[term.effect]
+    return mechanism.block is Block.SENSOR and not felt_by_motor(mechanism, mechanism.variants[term.variant], bench)
+
+
 def block_observed(effect: str, runs: Sequence[Measured]) -> bool:
     """True if input and output of the block of a mechanism are known in the recordings."""
     return not any(BY_ID[effect].block is _BLOCK_OF[channel] for run in runs for channel in run.observability.hidden)

@@ -16,6 +16,7 @@ from hil.diagnosis.acceptance import COMPARED, FORM, paying
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition
+from hil.diagnosis.search.initial_values import reads_wrong
 from hil.diagnosis.search.next_term import SearchRound, first_standing, ordered
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
@@ -124,10 +125,16 @@ def _ended(one: Addition, search: SearchRound) -> Addition:
 def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
+    Of two mechanisms with the same torque on every motion the more frequent cause is preferred, and an error of the
+    second encoder, which changes nothing else, to another axis.
     """
     near = [one for one in others if one.fit.jacobian.size and _evidence(best, one, bic_gain) < CRITERIA.tied]
-    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
+
+    def order(one: Addition) -> tuple[int, bool, bool]:
+        last = one.fit.terms[-1]
+        return one.fit.hypothesis.free, not is_frequent(last), not reads_wrong(last, one.fit.bench)
+
+    return min([best, *near], key=order)
 
 
 def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:

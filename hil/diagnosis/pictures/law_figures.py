@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures import looks
 from hil.diagnosis.pictures.fitted_law import FINE, FittedRows, Means, bin_edges, means
-from hil.diagnosis.pictures.laws import DrawnLaw
+from hil.diagnosis.pictures.laws import DrawnLaw, of_axis
 from hil.diagnosis.pictures.over_time import residual_over_time
 from hil.diagnosis.pictures.view import Captioned, Drawer, View
 from hil.figures.drawing import WIDTH_IN, Drawing, legend_outside, style_axis
@@ -26,10 +26,11 @@ ORDERS = 1500  # of a spectrum
 SPECTRUM_ROWS = 20_000
 
 
-def law_picture(law: DrawnLaw) -> Drawer:
+def law_picture(of_any: DrawnLaw) -> Drawer:
     """Make the picture of a law: folded on its period beside the spectrum, or over the whole quantity."""
 
     def picture(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
+        law = of_axis(of_any, diagnosis)
         if any(law.channel(view) not in view.before for view in views):
             return residual_over_time(diagnosis, views)
         period = law.period(views[0].term)

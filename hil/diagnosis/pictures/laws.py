@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -244,3 +244,17 @@ LAWS: dict[Picture, DrawnLaw] = {
         COMMAND, lambda term, d, x: _at(term, d, x), "torque", channel=_torque, bare=lambda x: x
     ),
 }
+
+
+def of_axis(law: DrawnLaw, diagnosis: Diagnosis) -> DrawnLaw:
+    """The law; that over the angle of a motor, for a linear one, over its way."""
+    axis = diagnosis.given_bench.axis
+    if law.over is not ANGLE or not axis.linear:
+        return law
+    per_m = axis.physics().angle_per_unit
+
+    def period_m(term: Term) -> float | None:
+        period = law.period(term)
+        return None if period is None else period / per_m
+
+    return replace(law, over=WAY, period=period_m, value=lambda term, d, x: law.value(term, d, per_m * x))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,13 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 
 from hil.arrays import FloatArray
-from hil.bench.bench_file import Bench
+from hil.bench.bench_file import Bench, load_bench
 from hil.diagnosis import stages
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.location.locate import block_shares
 from hil.diagnosis.pictures import location
 from hil.diagnosis.pictures.findings import finding_figure
-from hil.diagnosis.pictures.laws import LAWS
+from hil.diagnosis.pictures.laws import LAWS, of_axis
 from hil.diagnosis.pictures.view import around, view_of
 from hil.diagnosis.result import Result, Unexplained, Verdict
 from hil.diagnosis.search.facts import axis_facts
@@ -226,3 +227,19 @@ def test_a_panel_of_channels_that_show_nothing_is_left_out(monkeypatch: pytest.M
     titles = [axis.get_title("left") for axis in diagnosis.plot("location").axes]
     assert "Channel that shows it" not in titles
     assert "Phase of motion" in titles
+
+
+def test_cogging_of_a_linear_motor_is_drawn_over_its_way() -> None:
+    """Without a lead 2 pi of its angle are 1 m: 40 cycles are a pitch of 25 mm."""
+    linear = load_bench("emps").model_copy()
+    on: Any = SimpleNamespace(given_bench=linear, final=SimpleNamespace(bench=linear))
+    term = Term("cogging_torque", 0, (2.0, 40.0, 0.3))
+    law = of_axis(LAWS[Picture.COGGING], on)
+    per_turn_m = 2.0 * np.pi / linear.axis.physics().angle_per_unit
+    assert (law.over.label, law.over.unit(on)) == ("position", "m")
+    assert law.period(term) == pytest.approx(per_turn_m / 40.0)
+    x = np.linspace(0.0, 0.2, 7)
+    np.testing.assert_allclose(
+        np.abs(law.value(term, on, x)), np.abs(2.0 * np.sin(80.0 * np.pi * x / per_turn_m + 0.3))
+    )
+    assert of_axis(LAWS[Picture.COGGING], SimpleNamespace(given_bench=OWNER)) is LAWS[Picture.COGGING]

@@ -114,8 +114,7 @@ class Diagnosis:
                 raise InputError(f"number: given {number}, allowed 1 to {len(self.result.findings)} findings")
             return findings.finding_figure(self, self.term_of(number - 1)).figure
         run = (*self.held_out.runs, *self.train.runs)[0]
-        heading = f"{run.name}: measured - twin, noise floor in grey"
-        return over_time(heading, run.time_s, location.residual_panels(self, run))
+        return over_time(f"{run.name}: measured - twin", run.time_s, location.residual_panels(self, run))
 
     def __repr__(self) -> str:
         lines = [f"Diagnosis: {self.result.verdict}", f"  {self.result.statement}"]

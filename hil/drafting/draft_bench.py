@@ -130,7 +130,7 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
 
 def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> None:
     mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
-    inertia = f"inertia {digits(plant.inertia.value)} kg m^2 at the motor"
+    inertia = f"motor and screw included: inertia {digits(plant.inertia.value)} kg m^2 at the motor"
     draft.model = "rigid" if deflection is None else "two_mass"
     draft.axis.append(BenchValue("lead_m", lead.value, f"m per revolution, {_error(lead)}", lead.how))
     if deflection is None:

@@ -55,9 +55,7 @@ def over_time(title: str, time_s: FloatArray, panels: Sequence[Panel], rows: sli
             )
         style_axis(axis, f"{panel.label}\n[{unit}]")
     axes[0].set_title(title, loc="left")
-    labelled = [axis.get_legend_handles_labels() for axis in axes]
-    known = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
-    legend_above(axes[0], list(known.values()))
+    legend_outside(figure, axes)
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(time_s[0], time_s[-1])
     figure.align_ylabels(axes)
@@ -75,10 +73,9 @@ def style_axis(axis: Axes, label: str, x_label: str | None = None, title: str | 
     axis.margins(y=0.12)
 
 
-def legend_above(axis: Axes, handles: Sequence[object] | None = None) -> None:
+def legend_above(axis: Axes) -> None:
     """Put the legend above an axis, where it hides no line."""
     axis.legend(
-        handles=axis.get_legend_handles_labels()[0] if handles is None else handles,
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
         ncols=4,

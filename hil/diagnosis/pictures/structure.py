@@ -59,7 +59,7 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
         axis.errorbar(along * x, y, error, color=colour, label=label, fmt="o-", markersize=4, capsize=3, linewidth=0.8)
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
-    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name}"
+    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name.partition(' (')[0]}"
     style_axis(axis, f"{what}\n[{unit}]", f"{one.question.name} [{along_unit}]", title)
     if turn:
         axis.legend(frameon=False)

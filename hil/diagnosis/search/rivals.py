@@ -125,22 +125,17 @@ def _ended(one: Addition, search: SearchRound) -> Addition:
 def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    Of two mechanisms with the same torque on every motion the more frequent cause is preferred, and an error of the
-    second encoder, which changes nothing else, to another axis.
+    Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
     near = [one for one in others if one.fit.jacobian.size and _evidence(best, one, bic_gain) < CRITERIA.tied]
-
-    def order(one: Addition) -> tuple[int, bool, bool]:
-        last = one.fit.terms[-1]
-        return one.fit.hypothesis.free, not is_frequent(last), not reads_wrong(last, one.fit.bench)
-
-    return min([best, *near], key=order)
+    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
 
 
 def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation on the fewest parts of the axis of those that are not refuted.
 
-    What a part does that is found already needs no second cause elsewhere.
+    What a part does that is found already needs no second cause elsewhere. Of equals an error of the second encoder
+    comes first, with which nothing else of the axis changes.
     """
     margin = partial(bic_margin, filters=whitening(best.fit))
     near = [
@@ -151,7 +146,7 @@ def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
         and one.fit.hypothesis.free <= best.fit.hypothesis.free
         and not _refuted(_evidence(best, one, margin), one, best)
     ]
-    return min([best, *near], key=_parts)
+    return min([best, *near], key=lambda one: (_parts(one), not reads_wrong(one.fit.terms[-1], one.fit.bench)))
 
 
 def _parts(one: Addition) -> int:

@@ -33,7 +33,8 @@ def in_bench(final: Fit, held_out: Dataset) -> str:
         if clear and matters(final, kept, held_out if held_out.runs else final.data):
             term = Term(entry.effect, entry.variant, entry.values)
             told.append(sentence(term, final.bench, TermErrors(known, known[mechanism.strength])))
-    return f"The bench has already: {' '.join(told)}" if told else ""
+    where = "In the bench already, here refitted" if final.jacobian.size else "In the bench already"
+    return f"{where}: {' '.join(told)}" if told else ""
 
 
 def matters(fit: Fit, entry: MechanismEntry, data: Dataset) -> bool:

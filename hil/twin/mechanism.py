@@ -115,6 +115,7 @@ class Variant:
     starts: Callable[[Scene], Points] | None = None
     proportional: bool = True  # the change is proportional to the strength
     observable: Callable[[bool], bool] | None = None  # (the axis has a table encoder) -> its encoders show it
+    moves_torque: bool = False  # against the motion, in time: nothing beside a delay of the torque that is open
     contact: Contact | None = None
 
 

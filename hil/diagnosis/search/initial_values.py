@@ -197,7 +197,9 @@ _BLOCK_OF = {"command": Block.CONTROLLER, "torque": Block.DRIVE, "motor": Block.
 
 
 def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
-    """True if the encoders of a bench can show a variant of a mechanism."""
+    """True if the encoders of a bench can show a variant of a mechanism, which is none of its open parameters."""
+    if variant.moves_torque and bench.torque_delay_s is not None:
+        return False
     if not bench.has_table_encoder:
         return felt_by_motor(mechanism, variant, bench)
     return variant.observable is None or variant.observable(True)

@@ -94,8 +94,8 @@ MECHANISM = Mechanism(
     parameters=(Parameter("delay_s", Dimension.TIME, -_MOST_S, _MOST_S, role=Role.STRENGTH),),
     variants=(
         Variant(Stage.CHANNEL, _late_table, "table_position", observable=lambda table_encoder: table_encoder),
-        Variant(Stage.ANSWER, _late_torque, "torque", starts=_torque_starts, proportional=False),
-        Variant(Stage.CHANNEL, _late_motor, "motor_position"),
+        Variant(Stage.ANSWER, _late_torque, "torque", starts=_torque_starts, proportional=False, moves_torque=True),
+        Variant(Stage.CHANNEL, _late_motor, "motor_position", moves_torque=True),
     ),
     text=Text(
         "The channel {variant} is recorded {delay_s} late against the others.",

@@ -41,7 +41,7 @@ MECHANISM = Mechanism(
     parameters=(Parameter("delay_s", Dimension.TIME, 0.0, _MOST_S, role=Role.STRENGTH),),
     variants=(
         Variant(Stage.CURRENT, _delayed_command, "measured"),
-        Variant(Stage.TORQUE, _delayed_command, "hidden"),
+        Variant(Stage.TORQUE, _delayed_command, "hidden", moves_torque=True),
     ),
     text=Text("The torque command acts {delay_s} later than the controller believes.", Picture.DELAY),
     search=SearchHints(

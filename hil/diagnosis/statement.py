@@ -35,11 +35,10 @@ def statement(result: Result) -> str:
     if result.time_budget and not result.partial:
         return f"The time budget ended before the mismatch was explained{_unexplained(result)}{_closest(result)}"
     if result.partial:
-        explained = 1.0 - result.unexplained.share
-        told = f"For {percent(explained)} of its energy above the noise" if explained >= 0.5 else "For a part of it"
+        share = percent(1.0 - result.unexplained.share)
         return (
             f"{'The time budget ended, and no' if result.time_budget else 'No'} mechanism of the library explains the "
-            f"whole mismatch. {_found(told, result.partial)}{_left(result)}"
+            f"whole mismatch. {_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
         )
     at_floor = result.unexplained.description == AT_FLOOR
     what = (

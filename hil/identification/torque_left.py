@@ -68,10 +68,8 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
     return math.inf if left is None else left
 
 
-def mismatch_left(
-    before: Fit, after: Fit, data: Dataset, noise: Collection[str] = (), acts_on: Collection[str] | None = None
-) -> float:
-    """Share of the energy above the floor of a fit on a data set that another leaves, in [0, 1]; of channels `acts_on`.
+def mismatch_left(before: Fit, after: Fit, data: Dataset, noise: Collection[str] = ()) -> float:
+    """Share of the energy above the floor of a fit on a data set that another leaves, in [0, 1].
 
     The position of the motor counts slow motion and bursts more than all other motion. Where the torque that it needs
     beyond the twin's falls more, that is its share. What is left of the channels `noise` does not count.
@@ -80,8 +78,7 @@ def mismatch_left(
     missed, missing = torque_missed(before, data), torque_missed(after, data)
     if missed and missing is not None and math.isfinite(missed):
         left["motor"] = min(left["motor"], was["motor"] * (missing / missed) ** 2)
-    counted = was.keys() if acts_on is None else was.keys() & set(acts_on)
-    total, rest = sum(was[name] for name in counted), sum(left[name] for name in counted - set(noise))
+    total, rest = sum(was.values()), sum(value for name, value in left.items() if name not in noise)
     return min(rest / total, 1.0) if total > 0.0 else float(rest > 0.0)
 
 

@@ -48,9 +48,7 @@ def judge(tested: Tested) -> Judged:
     if change and change.explains_all:
         of_plant = Verdict.AXIS_CHANGED
     verdict = law.verdict(of_plant)
-    acts_on = {ablation.channel for ablation in tested.proof.ablations}
-    unnamed = verdict is Verdict.UNEXPLAINED and not change
-    is_part = unnamed and explains_most(searched.nominal, final, held_out, acts_on)
+    is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
         as_given = of_plant is Verdict.NO_MISMATCH and given_stands(searched.given, held_out)
         final = searched.given if as_given else refit.fit
@@ -104,13 +102,9 @@ def unexplained_share(nominal: Fit, final: Fit, held_out: Dataset, noise: Collec
     return mismatch_left(nominal, final, held_out if held_out.runs else final.data, noise)
 
 
-def explains_most(nominal: Fit, final: Fit, held_out: Dataset, acts_on: Collection[str]) -> bool:
-    """True if the terms explain most of the mismatch in the channels on which they act, whatever is above the noise.
-
-    What another channel lacks has another cause: no friction explains what a second encoder reads.
-    """
-    data = held_out if held_out.runs else final.data
-    return bool(final.terms) and mismatch_left(nominal, final, data, acts_on=acts_on) <= CRITERIA.most_left
+def explains_most(nominal: Fit, final: Fit, held_out: Dataset) -> bool:
+    """True if the terms explain most of the mismatch, whatever is left above the noise."""
+    return bool(final.terms) and unexplained_share(nominal, final, held_out) <= CRITERIA.most_left
 
 
 def refit_matters(given: Fit, nominal: Fit) -> bool:

@@ -79,8 +79,10 @@ class Explanation:
     def unsized(self) -> dict[str, list[str]]:
         """Channels of each map whose size nothing tells, so that their values are multiples."""
         found: dict[str, list[str]] = {}
-        for path, channel, *_ in (one.split(": ") for one in self.assumed if COUNT_AS in one):
-            found.setdefault(path, []).append(channel)
+        for note, mark, _ in (one.partition(f": {COUNT_AS}") for one in self.assumed):
+            path, _, channel = note.rpartition(": ")
+            if mark:
+                found.setdefault(path, []).append(channel)
         return found
 
     @property

@@ -58,15 +58,15 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
 
 
 @njit(cache=True)
-def loaded_bound(p: Any, bound: float, drag: float, towards: float, torque: float) -> float:
-    """Coulomb bound under the load that is carried: bound + share |torque - all friction|, by successive substitution.
+def loaded_bound(p: Any, bound: float, drag: float, scale: float, towards: float, torque: float) -> float:
+    """Coulomb bound under a load: bound + scale share |torque - Coulomb friction - drag|, by successive substitution.
 
     `towards` has the sign of the motion, or of the one that friction prevents.
     """
     way = np.sign(towards)
     level = bound
     for _ in range(60):
-        level = bound + p.load_dependent_friction.share * abs(torque - way * level - drag)
+        level = bound + scale * p.load_dependent_friction.share * abs(torque - way * level - drag)
     return level
 
 

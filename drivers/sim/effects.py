@@ -63,7 +63,7 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         "r a ramp from 0 to 1 over -1/2 to 1/2",
         {"fraction": ParameterRange(low=-1.0), "begin_m": _ANY, "end_m": _ANY, "flank_m": _POSITIVE}),
     "load_dependent_friction": Definition(
-        "Coulomb and static friction plus share |torque of the motor - friction|", {"share": ParameterRange(0.0, 0.8)}),
+        "Coulomb and static friction plus share |torque of the motor - friction|", {"share": ParameterRange(0.0, 0.5)}),
     "nonlinear_viscous_friction": Definition("drag quadratic v |v|", {"quadratic_n_m_s2_rad2": _AT_LEAST_0}),
     "friction_drift": Definition(
         "all friction times 1 + fraction (1 - exp(-t / time_constant))",

@@ -118,7 +118,7 @@ def kick(p: Any, s: Any, index: int, side: int, share: float, viscous: float, ti
         bound, offset, drag, scale = friction_law(p, speed, s.position[index], time_s)
         if p.load_dependent_friction.on:
             towards = mass * s.velocity[index] + h * (s.force[index] - drag / ratio)
-            bound = loaded_bound(p, bound, drag, towards, s.torque)
+            bound = loaded_bound(p, bound, drag, scale, towards, s.torque)
         bound, offset = share * bound, share * offset
         drag = share * drag + scale * (viscous - share * p.viscous) * speed
     else:

@@ -76,8 +76,8 @@ def explain(
         out.print(f"{warning}.\n")
     for path, channels in found.unsized.items():
         out.print(
-            f"Nothing tells the size of {', '.join(channels)}: values are multiples, and names can be wrong. "
-            f"Correct {path} and call it again.\n"
+            f"Nothing tells the size of {', '.join(channels)}: values are multiples of the true ones, and a named "
+            f"effect can be wrong. Write the size into {path} and run the command again.\n"
         )
     out.print(page_line(found.report))
     if show and found.report.exists():

@@ -37,7 +37,7 @@ def _above(rms: float, found: FitFigures) -> bool:
 def _below_the_noise(result: Result) -> str:
     told, left = list[str](), result.torque_left
     if left and left.final is not None:
-        before = min((one for one in (left.owner, left.refitted) if one is not None), default=0.0)
+        before = left.before or 0.0
         if left.final < before and percent(left.final) != percent(before):
             told.append(
                 f"with it the torque left unexplained on held-out motion falls from {digits(100.0 * before)} to "
@@ -46,7 +46,8 @@ def _below_the_noise(result: Result) -> str:
     chances = [chance for one in result.findings if (chance := _chance(result, one.effect)) is not None]
     if chances:
         what = "its shape" if len(result.findings) == 1 else "each shape"
-        told.append(f"all rows together tell {what}, though it is below the noise of one ({by_chance(max(chances))})")
+        by = by_chance(max(chances))
+        told.append(f"{what} is clear from all rows together, though in one row it is below the noise ({by})")
     text = "; ".join(told) or "without it every residual was within its noise, too"
     return f"{text[:1].upper()}{text[1:]}."
 

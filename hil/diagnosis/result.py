@@ -162,6 +162,11 @@ class TorqueLeft(ResultPart):
         description="inertia, viscous and Coulomb friction and offset by least squares over the training recordings"
     )
 
+    @property
+    def before(self) -> float | None:
+        """The smaller one of bench file and refit, without new physics."""
+        return min((one for one in (self.owner, self.refitted) if one is not None), default=None)
+
 
 class ChangedParameter(ResultPart):
     """A parameter of the axis that is another one in each part of the recordings."""

@@ -69,8 +69,8 @@ def axis_page(trend: AxisTrend, diagnoses: Sequence[Row]) -> bytes:
             "jackknife over blocks of rows.",
             "Changes are found by optimal partitioning into levels and lines, with a likelihood that decides between "
             "changes and correlated noise. A recording far from all that are next to it counts for no change; four at "
-            "another level do. The threshold is such that at one recording a day at most one false change a year is "
-            "expected in all quantities of an axis together.",
+            "another level do. The threshold is such that at one recording and one look a day at most one false change "
+            "a year is expected of white noise in all quantities of an axis together, two if it is correlated by 0.8.",
             "Assumed is noise whose correlation from one recording to the next is 0.8 at most: a slower wander, as of "
             "the season, counts as change. Until some 40 recordings a step below three times the scatter in their "
             "middle may be taken for such noise.",

@@ -206,8 +206,9 @@ class ChannelEntries:
             ratio = 1.0 if same else counts_ratio(abs(factor))
             given = f"write the same as for {encoder}" if same else f"write {ratio:.6g} times that of {encoder}"
             if channel == "table_position_m" and not same:
-                given = f"write those per revolution of the load, or, if it is on the motor's shaft, {given[6:]}"
-                given += "; of a linear scale write counts_per_m, and above the line 'channels:' lead_m: VALUE"
+                on_shaft = given.removeprefix("write ")
+                given = f"write those per revolution of the load, or, if it is on the motor's shaft, {on_shaft}"
+                given += "; of a linear scale write counts_per_m in its place, and lead_m above the line 'channels:'"
             keys |= {key: size * ratio for key, size in self.unsized.items()}
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive

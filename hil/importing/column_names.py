@@ -90,7 +90,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         unit = None
     known = lexicon()
     steps = _any(words, known.steps) and not _any(words, known.encoder)
-    if steps and quantity is Quantity.UNKNOWN:
+    if steps and quantity is Quantity.UNKNOWN and not odd and (_any(words, known.command) or len(tokens) == 1):
         quantity, unit = Quantity.POSITION, unit or "counts"
     return Label(
         column,

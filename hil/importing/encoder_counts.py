@@ -21,8 +21,8 @@ _USUAL = 0.003  # relative deviation from usual counts, or from a usual pair of 
 
 _SCALE = 0.01  # deviation of the count of a linear scale: the errors of a lead are below
 _WHOLE = 1e-3  # deviation from usual counts per turn: that of steps of few digits
-# Denominator of a ratio of two encoders or steppers, 4000 counts for 3200 steps are 5/4, and deviation from it: within
-# that of whole steps any ratio would be such a fraction, and its error one of the transmission.
+# Largest denominator of a ratio of two encoders or steppers (4000 counts for 3200 steps are 5/4), and deviation allowed
+# from such a fraction. At 1e-3 nearly any ratio would pass, and the rest look like an error of the transmission.
 _LARGEST, _FRACTION = 32, 1e-4
 _DECIMAL = 1e-3  # deviation of a step from a power of ten: of printed digits it tells nothing
 

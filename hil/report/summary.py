@@ -22,11 +22,13 @@ def print_diagnosis(result: Result) -> None:
     ]
     left = result.torque_left
     if left and left.final is not None:
-        before = min((one for one in (left.owner, left.refitted) if one is not None), default=left.final)
-        rows.append(("torque not explained", percent(before), percent(left.final), ""))
+        before = "" if left.before is None else percent(left.before)
+        rows.append(("torque not explained", before, percent(left.final), ""))
     table(("rms, held out" if held_out else "rms", "before", "after", "noise floor"), rows)
-    if left and left.plain is not None:
-        out.print(f"  torque: share of its standard deviation; plain least squares leave {percent(left.plain)}")
+    if left and left.final is not None:
+        out.print(
+            f"  torque on held-out motion, over its deviation (rms); plain least squares leave {percent(left.plain)}"
+        )
     if result.time_budget:
         out.print(
             f"\nThe search ended with its time budget of {digits(result.time_budget.budget_s)} s before "

@@ -72,7 +72,7 @@ class Moment(NamedTuple):
     table_position_m: float
     ratio_m: float  # m of the table per unit of the motor
     viscous_speed: float  # of the motor, at which viscous friction equals Coulomb friction; 0: there is none
-    torque: float = 0.0  # that the motor makes, for friction
+    torque: float = 0.0  # of the motor less viscous friction and drag; for friction
 
 
 class Contact(StrEnum):
@@ -115,7 +115,7 @@ class Variant:
     starts: Callable[[Scene], Points] | None = None
     proportional: bool = True  # the change is proportional to the strength
     observable: Callable[[bool], bool] | None = None  # (the axis has a table encoder) -> its encoders show it
-    moves_torque: bool = False  # against the motion, in time: nothing beside a delay of the torque that is open
+    moves_torque: bool = False  # in time against the motion: not searched where the bench leaves torque_delay_s open
     contact: Contact | None = None
 
 

@@ -1,7 +1,7 @@
 """Figure of a delay or a lag: a signal behind the one that it follows.
 
-Cross-correlation over the lag; the difference from the twin over the rate, on which a delay is a line with its size as
-slope; and both signals at the fastest change.
+Cross-correlation over the lag; the difference from the twin over the rate, where a delay is a straight line whose slope
+is minus the delay; and both signals at the fastest change.
 """
 
 from __future__ import annotations
@@ -74,8 +74,8 @@ def cross_correlation(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
     return Captioned(
         figure,
         f"Cross-correlation of the rate of {name} with that of {of}: a delay moves its peak, a lag bends it. Right: "
-        "what the twin without it leaves, over the rate: a delay is a line with its size as slope. Below: both at the "
-        "fastest change.",
+        "what the twin without this effect leaves, over the rate: of a delay a straight line, steep if it is long. "
+        "Below: both at the fastest change.",
     )
 
 

@@ -58,7 +58,6 @@ def law_at(
     velocity: float | FloatArray = 0.0,
     table_m: float | FloatArray = 0.0,
     time_s: float | FloatArray = 0.0,
-    torque: float | FloatArray = 0.0,
 ) -> FloatArray:
     """Value (n,) of a term's stage, of which it is a function without memory, from the value before it."""
     contribution = BY_ID[term.effect].variants[term.variant].contribution
@@ -66,13 +65,13 @@ def law_at(
     parameters[: len(term.values)] = term.values
     memory, viscous_speed = np.zeros(WIDTH), bench.axis.physics().viscous_speed
     states = np.broadcast_arrays(
-        *(np.asarray(one, dtype=float) for one in (value, angle_rad, velocity, table_m, time_s, torque))
+        *(np.asarray(one, dtype=float) for one in (value, angle_rad, velocity, table_m, time_s))
     )
     found = [
         contribution(
-            u, Moment(t, 0.0, 1.0, 0.0, angle, v, x, bench.axis.ratio_m_rad, viscous_speed, carried), parameters, memory
+            u, Moment(t, 0.0, 1.0, 0.0, angle, v, x, bench.axis.ratio_m_rad, viscous_speed), parameters, memory
         )
-        for u, angle, v, x, t, carried in zip(*(one.ravel().tolist() for one in states), strict=True)
+        for u, angle, v, x, t in zip(*(one.ravel().tolist() for one in states), strict=True)
     ]
     return np.asarray(found, dtype=np.float64)
 

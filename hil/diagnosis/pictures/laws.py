@@ -100,7 +100,14 @@ SCALE = Abscissa(lambda d, view: view.run.table_m - view.before["table"], "posit
 TIME = Abscissa(lambda d, view: view.run.time_s, "time", lambda d: "s", "frequency [Hz]", 1.0)
 COMMAND = Abscissa(lambda d, view: view.run.torque_command, "torque command", _drive)
 
-LOAD = Abscissa(lambda d, view: view.run.torque + _friction(d, view), "torque that is carried", _drive)
+LOAD = Abscissa(lambda d, view: _load(d, view), "load that is carried", _drive)
+
+
+def _load(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """Torque (n,) that is carried: that of the motor less all friction, of which the load makes a share."""
+    without = view.run.torque + _friction(diagnosis, view)
+    driven = np.sign(without) * np.sign(view.torque.velocity)
+    return without / (1.0 + driven * view.term.values[BY_ID[view.term.effect].strength])
 
 
 def _against_motion(diagnosis: Diagnosis, view: View) -> FloatArray:
@@ -221,7 +228,7 @@ LAWS: dict[Picture, DrawnLaw] = {
         period=_period,
     ),
     Picture.FRICTION_OVER_LOAD: DrawnLaw(
-        LOAD, lambda term, d, x: _at(term, d, torque=x), "friction, change", carrier=_against_motion
+        LOAD, lambda term, d, x: term.values[0] * np.abs(x), "friction, change", carrier=_against_motion
     ),
     Picture.FRICTION_OVER_TIME: DrawnLaw(
         TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction

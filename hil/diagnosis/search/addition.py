@@ -180,9 +180,8 @@ def torque_of(
 
     Without it is also the twin of the bench file, if `given`: a fit whose other parameters pay for a term is worse.
 
-    An error of the transmission is no torque on an axis without a spring, nor one of the second encoder on any: what a
-    fit leaves beside it is the matter of its other parameters. One of the motor's encoder is: a motion that is read
-    late, or wrong over the angle, needs another torque.
+    An error of the transmission is no torque on an axis without a spring, nor is an error of the second encoder on any
+    axis. One of the motor's encoder is: a motion that is read late, or wrong over the angle, needs another torque.
     """
     mechanism = BY_ID[term.effect]
     variant = mechanism.variants[term.variant]

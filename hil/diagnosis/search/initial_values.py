@@ -197,7 +197,10 @@ _BLOCK_OF = {"command": Block.CONTROLLER, "torque": Block.DRIVE, "motor": Block.
 
 
 def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
-    """True if the encoders of a bench can show a variant of a mechanism, which is none of its open parameters."""
+    """True if the encoders of a bench can show a variant of a mechanism.
+
+    False for a lateness of the torque where the bench leaves `torque_delay_s` open.
+    """
     if variant.moves_torque and bench.torque_delay_s is not None:
         return False
     if not bench.has_table_encoder:

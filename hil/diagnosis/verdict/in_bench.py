@@ -22,7 +22,7 @@ def in_bench(final: Fit, held_out: Dataset) -> str:
     errors = dict(zip(hypothesis.nominal, standard_errors(final) if final.jacobian.size else (), strict=False))
     axis, told = final.bench.axis, list[str]()
     for name in axis.SPRINGS:
-        if unit_of(name) == "1":  # damping
+        if unit_of(name) == "1":  # damping, or a factor on a stiffness, is no size of a spring
             continue
         if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
             told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
@@ -33,7 +33,7 @@ def in_bench(final: Fit, held_out: Dataset) -> str:
         if clear and matters(final, kept, held_out if held_out.runs else final.data):
             term = Term(entry.effect, entry.variant, entry.values)
             told.append(sentence(term, final.bench, TermErrors(known, known[mechanism.strength])))
-    where = "In the bench already, here refitted" if final.jacobian.size else "In the bench already"
+    where = "The bench file has already, here refitted" if final.jacobian.size else "The bench file has already"
     return f"{where}: {' '.join(told)}" if told else ""
 
 

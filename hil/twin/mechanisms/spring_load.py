@@ -1,6 +1,7 @@
 """Spring load: a force on the table proportional to its position."""
 
 from collections.abc import Sequence
+from math import isfinite
 
 from numba import njit
 
@@ -16,8 +17,8 @@ def _pull_to_rest(value: float, at: Moment, parameters: Row, memory: Row) -> flo
     return value - parameters[0] * (at.table_position_m - parameters[1])
 
 
-# Travels beyond either end: no motion tells a weight from a rest position that is shifted. Of a spring with a rest
-# position farther away most of the force is constant: it is a weight, and the spring, if it is told, a term beside it.
+# Travels beyond either end: the force of a spring that rests farther away is mostly constant. It is a weight; what is
+# left of its slope may be found as a spring beside it.
 _NEAR = 1.0
 
 
@@ -31,6 +32,12 @@ def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
     """Check that the rest position is near the travel."""
     first_m, last_m = axis.positions_m
     return max(first_m - values[1], values[1] - last_m) < _NEAR * axis.travel_m
+
+
+def _weight(values: Sequence[float], axis: AxisFacts) -> tuple[str, tuple[float, ...]]:
+    """The constant load with the force of the spring in the middle of the travel."""
+    middle_m = 0.5 * sum(axis.positions_m) if all(map(isfinite, axis.positions_m)) else 0.0
+    return LOAD.id, (values[0] * (middle_m - values[1]) * axis.ratio,)
 
 
 MECHANISM = Mechanism(
@@ -47,5 +54,5 @@ MECHANISM = Mechanism(
     text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.FORCE_OVER_TRAVEL),
     search=SearchHints(_starts, lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     valid=_valid,
-    beyond=lambda values, a: (LOAD.id, (-values[0] * values[1] * a.ratio,)),
+    beyond=_weight,
 )

@@ -30,9 +30,11 @@ def under(at, torque, speed):  # type: ignore[no-untyped-def]
 
 
 @njit(_nrt=False, forceinline=True, **COMPILE)
-def _level(c, scale, at, effects):  # type: ignore[no-untyped-def]
-    """Coulomb friction and drag at the speed of the moment."""
-    return scale * max(_coulomb(c.coulomb, at, effects), 0.0), scale * _drag(0.0, at, effects)
+def level(c, scale, at, effects):  # type: ignore[no-untyped-def]
+    """Coulomb friction and drag at the speed of the moment, whose torque is that of the motor."""
+    drag = scale * _drag(0.0, at, effects)
+    loaded = under(at, at.torque - scale * c.viscous * at.velocity - drag, at.velocity)
+    return scale * max(_coulomb(c.coulomb, loaded, effects), 0.0), drag
 
 
 @njit(_nrt=False, forceinline=True, **COMPILE)
@@ -60,10 +62,10 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
     viscous_share = _table_viscous_share(share, at, effects)
     viscous, rest = scale * c.viscous, 1.0 - share
     viscous, guide_viscous = (1.0 - viscous_share) * viscous, viscous_share * viscous
-    bound, opposing = _level(c, scale, at, effects)
+    bound, opposing = level(c, scale, at, effects)
     if effects.codes.coulomb or effects.codes.drag:  # at the middle of the step friction over speed is second order
         met = _rigid(free, gain, Resistance(rest * bound, viscous, shift, rest * opposing))
-        bound, opposing = _level(c, scale, under(at, at.torque, 0.5 * (motion.speed + free - gain * met)), effects)
+        bound, opposing = level(c, scale, under(at, at.torque, 0.5 * (motion.speed + free - gain * met)), effects)
     resistance = Resistance(rest * bound, viscous, shift, rest * opposing)
     motor = _contact(c.slips, free, gain, resistance, rest * stiffness, own.motor_contact, at.step_s, motion.speed)
     guide = 0.0

@@ -10,13 +10,13 @@ from numba import njit
 
 from hil.twin.stepping import stages
 from hil.twin.stepping.contact import COMPILE
-from hil.twin.stepping.friction import under
+from hil.twin.stepping.friction import level, under
 from hil.twin.stepping.kernel import read
 from hil.twin.stepping.records import shapes_of
 from hil.twin.stepping.static_equilibrium import settle
 from hil.twin.stepping.transmission import moment
 
-_coulomb, _drag, _scale, _bias = stages.coulomb, stages.drag, stages.friction_scale, stages.bias
+_scale, _bias = stages.friction_scale, stages.bias
 _share, _viscous_share = stages.table_share, stages.table_viscous_share
 _current, _torque, _motor_torque, _table_force = stages.current, stages.torque, stages.motor_torque, stages.table_force
 _Effects = stages.Effects
@@ -38,13 +38,17 @@ def steady(positions, speed, time_s, constants, modes, values, codes, memory):  
         viscous_share = _viscous_share(share, at, effects)
         viscous = scale * c.viscous * speed
         moved = _bias(0.0, at, effects) + viscous - _table_force(0.0, at, effects) * c.ratio
-        goal = sliding = 0.0
-        for _ in range(INVERSIONS):  # friction may grow with the torque that it is part of
-            before, loaded = goal, under(at, goal, speed)
-            sliding = scale * (sign * max(_coulomb(c.coulomb, loaded, effects), 0.0) + _drag(0.0, loaded, effects))
-            goal = moved + sliding
-            if abs(goal - before) <= INVERTED * abs(goal):
+        other, goal, sliding = _motor_torque(0.0, at, effects), moved, 0.0
+        for _ in range(INVERSIONS):  # friction may grow with the torque that it is part of: Steffensen's method
+            bound, drag = level(c, scale, under(at, goal - other, speed), effects)
+            sliding = sign * bound + drag
+            once = moved + sliding
+            if abs(once - goal) <= INVERTED * abs(once):
                 break
+            bound, drag = level(c, scale, under(at, once - other, speed), effects)
+            twice = moved + sign * bound + drag
+            bent = twice - 2.0 * once + goal
+            goal = goal - (once - goal) ** 2 / bent if bent != 0.0 else twice
         on_table[k] = share * sliding + viscous_share * viscous
         command = goal
         for _ in range(INVERSIONS):

@@ -173,7 +173,7 @@ def _compressed(half: Half, rng: Rng) -> Edit:
 def _by_load(half: Half, rng: Rng) -> Edit:
     coulomb, viscous = half.plain["coulomb"].value, max(half.plain["viscous"].value, 0.0)
     load = half.torque - coulomb * half.moved.direction - viscous * half.moved.velocity
-    return _added(half, np.abs(load) * half.moved.direction, load_dependent_friction.MECHANISM, 0.8, told=(0,))
+    return _added(half, np.abs(load) * half.moved.direction, load_dependent_friction.MECHANISM, 0.5, told=(0,))
 
 
 def _ramp(half: Half, rng: Rng) -> Edit:

@@ -84,7 +84,8 @@ def test_the_law_of_the_library_gives_the_recording_back(uses: dict[str, Half], 
     parameters, memory = np.array(values), np.zeros(WIDTH)
 
     def apply(inputs: np.ndarray) -> np.ndarray:
-        rows = zip(inputs, half.time_s, half.angle_rad, half.moved.velocity, half.position_m, changed, strict=True)
+        loads = changed - max(viscous, 0.0) * half.moved.velocity
+        rows = zip(inputs, half.time_s, half.angle_rad, half.moved.velocity, half.position_m, loads, strict=True)
         return np.array([
             law(value, Moment(time_s, 0.0, period_s, period_s, angle, speed, at, half.ratio, coulomb / viscous, torque),
                 parameters, memory)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from command_line import hil, refused
 from compare_runs import bench_with, record
-from scope_process import page_of, post, scope
+from scope_process import ScopeClient, page_of, post, scope
 from websockets.exceptions import InvalidStatus
 
 from hil.recording.recording import Recording, read_recording
@@ -58,6 +58,14 @@ def rows_of(run: Recording, first: int, end: int) -> list[tuple[float, ...]]:
     return list(zip(*(values[first:end].tolist() for values in run.columns.values()), strict=True))
 
 
+def shown_rows(page: ScopeClient, came: np.ndarray, count: int) -> np.ndarray:
+    """The points (k, n) that the page shows once they are `count`: a view replaces those that came before."""
+    while came.shape[1] < count:
+        header, values = page.next("view", "append")
+        came = values if header["kind"] == "view" else np.hstack((came, values))
+    return came
+
+
 def test_rows_come_as_they_are_recorded_also_after_a_new_start(folder: Path, run: Recording, live: str) -> None:
     with page_of(live) as page:
         for name in ("first", "second"):
@@ -67,16 +75,10 @@ def test_rows_come_as_they_are_recorded_also_after_a_new_start(folder: Path, run
                 header, _ = page.next("rows")
                 assert header["name"] == name
                 page.send("see", traces=NAMES, window_s=0.5, points=5000)
-                came = np.empty((5, 0))
-                while came.shape[1] < 300:
-                    header, values = page.next("view", "append")
-                    if header["kind"] == "view":
-                        came = np.empty((len(values), 0))
-                    came = np.hstack((came, values))
+                came = shown_rows(page, np.empty((5, 0)), 300)
                 for row in rows_of(run, 300, 400):
                     recorder.record(row)
-                while came.shape[1] < 400:
-                    came = np.hstack((came, page.next("append")[1]))
+                came = shown_rows(page, came, 400)
                 for index, channel in enumerate(["time_s", *NAMES]):
                     assert np.array_equal(came[index], run[channel][:400]), channel
                 status, _ = page.next("status")

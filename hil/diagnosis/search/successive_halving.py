@@ -31,8 +31,8 @@ _Item = TypeVar("_Item")
 
 # Torque accuracy of the motor channel in a search: its higher weight makes the cost of stick-slip smoother.
 SEARCH_ACCURACY = 0.2
-# Halving: 8 candidates get a first fit, 4 a second, 3 are converged; more of them only extend the search.
-_STARTED, _CONTINUED, _FINISHED = 8, 4, 3
+# Halving: 9 candidates get a first fit, 5 a second, 3 are converged; more of them only extend the search.
+_STARTED, _CONTINUED, _FINISHED = 9, 5, 3
 _FIRST, SECOND = 6, 4  # evaluations of the first fit (with the derivatives of the base) and of the second
 LONG = 25  # evaluations of a last fit
 # A second fit is converged if its cost is below _BEATEN times that of the converged leader or _LEVEL times that of the

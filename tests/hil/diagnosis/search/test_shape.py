@@ -66,7 +66,7 @@ def test_a_delay_or_a_resonance_that_passes_less_noise_is_not_told() -> None:
 @pytest.mark.parametrize("free", [3.0, 40.0, 3e3, 1e5])
 @pytest.mark.parametrize("ratio", [0.0, 2.0, 30.0, 90.0, 1e3])
 def test_the_tail_of_students_t_is_told_where_it_is_no_floating_point_number(ratio: float, free: float) -> None:
-    """So that of two clear shapes the clearer one comes first."""
+    """Two shapes whose chances are both 0.0 as numbers can be ordered by their logarithms."""
 
     def over_density(way: float) -> float:
         return math.exp(student.logpdf(ratio + way, free) - student.logpdf(ratio, free))

@@ -160,7 +160,7 @@ def _explains(of: Remainder, c: Criteria) -> Answer:
         or (of.open_inputs and of.left <= c.most_left)
         or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))
     )
-    return stands, {"left": of.told, "above": of.above}
+    return stands, {"left": of.told if of.left < 1.0 else of.left, "above": of.above}
 
 
 def names_stand(left: float, above: float, c: Criteria = CRITERIA) -> bool:

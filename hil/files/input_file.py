@@ -27,6 +27,8 @@ MOST_BYTES = 8 * MOST_VALUES  # of a file; of text this is eight characters for 
 MOST_IN_LINE = 200_000  # characters of a line of text: a thousand columns have 20 000
 LONGEST_S = 15.0  # of processor time for one file
 MOST_GROWTH = 1_500_000_000  # bytes of memory
+WIDE = (b"\xff\xfe", b"\xfe\xff")  # marks at the beginning of UTF-16
+_BEGINNING = 4096
 _LOOK_S = 0.05  # of processor time between two looks
 
 Given = ParamSpec("Given")
@@ -51,6 +53,18 @@ def check_file(path: Path, allowed: str, most_bytes: int = MOST_BYTES) -> None:
         raise InputError(f"{path}: is no regular file ({kind}); give {allowed}")
     if found.st_size > most_bytes:
         raise InputError(f"{path}: given {found.st_size} bytes, allowed {most_bytes}; give {allowed}")
+
+
+def first_bytes(path: Path) -> bytes:
+    """The beginning of a file, by which its kind is told."""
+    with path.open("rb") as file:
+        return file.read(_BEGINNING)
+
+
+def is_text(start: bytes) -> bool:
+    """True if a file that begins so is text: UTF-16 with its mark, or hardly a control character."""
+    controls = sum(byte < 9 or 13 < byte < 32 for byte in start)
+    return start.startswith(WIDE) or (b"\x00" not in start and controls <= len(start) // 50)
 
 
 def check_values(path: Path, values: int, given: str) -> None:

@@ -44,6 +44,8 @@ def comment_lines(text: str, indent: str = "") -> str:
 def with_changes(text: str, changes: Sequence[YamlChange]) -> str:
     """Set values and add comments. A key that the file lacks is added at the end of its mapping; a mapping is merged.
 
+    A comment on a key that the file lacks is a line of its own.
+
     Raises ValueError where the file has something else in the place of a mapping.
     """
     root, comments, edits = _root(text), dict[int, list[str]](), list[_Edit]()
@@ -62,15 +64,17 @@ def with_changes(text: str, changes: Sequence[YamlChange]) -> str:
                 value = {name: value}
             if not isinstance(node, yaml.MappingNode):
                 raise ValueError(f"{change.path}: the file has no mapping there")
-            parent, entry, line = node, f"{key}: {_flow(value)}", _end(node).line
+            entry = f"# {key}" if change.value is None else f"{key}: {_flow(value)}"
+            parent, line = node, _end(node).line
             if not node.flow_style:
-                comment = f"{GAP}# {change.comment}" if change.comment else ""
+                comment = f"{': ' if change.value is None else f'{GAP}# '}{change.comment}" if change.comment else ""
                 below = _line_end(text, _end(node).index)
                 edits.append(_Edit(below, 2, below, f"\n{' ' * node.start_mark.column}{entry}{comment}"))
                 continue
             inside = node.end_mark.index - 1
-            edits.append(_Edit(inside, 0, inside, f", {entry}" if node.value or inside in filled else entry))
-            filled.add(inside)
+            if change.value is not None:
+                edits.append(_Edit(inside, 0, inside, f", {entry}" if node.value or inside in filled else entry))
+                filled.add(inside)
         if change.comment:
             named = f"{key}: {change.comment}" if parent.flow_style else change.comment
             comments.setdefault(line, []).append(named)

@@ -1,7 +1,7 @@
 """Read the name of a column: quantity, set-point or measured, motor or table, unit. The words are in `lexicon.yaml`."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
@@ -69,7 +69,9 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     beside = _words(plain_words(words_beside))
     words = _words(tokens) + beside
     index = _INDEX.search(name if unit else column.strip())
-    odd = odd and index is None
+    known = lexicon()
+    of_steps = odd and _counts_steps(f"{unit_text} {column}", known.steps)
+    odd = odd and index is None and not of_steps
     # of a path the last words count: pid.x.output, /joint_states/joint1/position
     parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]
     found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
@@ -88,8 +90,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         quantity = of_unit
     elif unit and unit not in QUANTITY_OF_UNIT:
         unit = None
-    known = lexicon()
-    steps = _any(words, known.steps) and not _any(words, known.encoder)
+    steps = (of_steps or _any(words, known.steps)) and not _any(words, known.encoder)
     if steps and quantity is Quantity.UNKNOWN and not odd and (_any(words, known.command) or len(tokens) == 1):
         quantity, unit = Quantity.POSITION, unit or "counts"
     return Label(
@@ -109,6 +110,11 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _any(words, known.encoder),
         steps,
     )
+
+
+def _counts_steps(text: str, steps: Collection[str]) -> bool:
+    """True for a unit of steps: [1/16 step], (usteps)."""
+    return any(word in steps or f"{word}s" in steps for word in plain_words(text))
 
 
 def _unit_of_object(name: str) -> str | None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from hil.errors import InputError
 from hil.files.date_stamps import is_date
-from hil.files.input_file import lines_of
+from hil.files.input_file import WIDE, first_bytes, is_text, lines_of
 from hil.importing.cell_units import has_unit, number_part
 from hil.importing.encodings import encoding_of
 from hil.importing.header_rows import COMMENT, Header, read_header
@@ -92,14 +92,12 @@ def _split_by_commas(above: list[str], width: int) -> int:
 
 
 def _lines(path: Path) -> tuple[list[str], str]:
-    with path.open("rb") as file:
-        start = file.read(4096)
+    start = first_bytes(path)
     if not start.strip():
         raise InputError(f"{path}: the file is empty; give a file with a header and rows of numbers")
-    wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
-    if not wide and (b"\x00" in start or sum(byte < 9 or 13 < byte < 32 for byte in start) > len(start) // 50):
+    if not is_text(start):
         raise InputError(f"{path}: is not text but binary data; export the recording as CSV, .mat, Parquet or JSON")
-    encoding = "utf-16" if wide else _encoding(path)
+    encoding = "utf-16" if start.startswith(WIDE) else _encoding(path)
     try:
         with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as file:
             return [line.rstrip("\r\n") for line in islice(lines_of(path, file), MOST_LINES)], encoding

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
 from hil.files.date_stamps import seconds_of
-from hil.files.input_file import check_file
+from hil.files.input_file import check_file, first_bytes, is_text
 from hil.importing.long_text import long_form
 from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import mat_column, mat_scalar
@@ -51,9 +51,11 @@ def check_foreign(path: Path) -> None:
 def format_of(path: Path) -> str:
     """Format of a file: .csv (any text of rows), .mat (of variables by name), .parquet, .json (of records).
 
-    Raises InputError for another one.
+    A file with another ending is read as what it holds, if that is text. Raises InputError for another one.
     """
     ending = path.suffix.lower()
+    if ending not in _ENDINGS and path.is_file() and is_text(first_bytes(path)):
+        ending = ".txt"
     if ending not in _ENDINGS:
         raise InputError(
             f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)}; "

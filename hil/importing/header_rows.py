@@ -74,7 +74,7 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
     rows = [row for row in read if row is not None]
     # a row that is one field short counts where no other one tells what the columns are
     rows = [row for row in rows if row.whole] if any(row.whole and row.sure for row in rows) else rows
-    rows = _below_padded(rows)
+    rows = _without_list(_below_padded(rows))
     texts = [row for row in rows if row.kind in (RowKind.NAMES, RowKind.TEXT)]
     named = _names(texts)
     if named is None:
@@ -126,6 +126,15 @@ def _below_padded(rows: list[HeaderRow]) -> list[HeaderRow]:
     padded = [not any(row.fields[-2:]) for row in rows]
     first = padded.index(False) if False in padded else 0
     return rows[first:]
+
+
+def _without_list(rows: list[HeaderRow]) -> list[HeaderRow]:
+    """Rows without those that each describe a column by its name in another row: CH1;Pos;mm over #;CH1;CH2."""
+    for row in rows:
+        described = [one for one in rows if one is not row and one.fields[0] and one.fields[0] in row.fields[1:]]
+        if len({one.fields[0] for one in described}) > 1:
+            return [one for one in rows if one not in described]
+    return rows
 
 
 def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, counted: bool) -> HeaderRow | None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from functools import cache
 
 from hil.importing.column_names import label
 from hil.importing.lexicon import Quantity, RowKind, lexicon
@@ -77,8 +78,17 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
     bracket = _BRACKET.search(match[1])
     if bracket and (unit_named(bracket[1]) or factor_and_unit(bracket[1])):
         return match[1][: bracket.start()].strip(), bracket[1]
-    units = [field for field in fields[1:] if unit_named(field)]
-    return (fields[0], units[-1]) if units else None
+    units = [place for place, field in enumerate(fields) if place and unit_named(field)]
+    if not units:
+        return None
+    scales = [scale["factor"] for field in fields if (scale := re.fullmatch(_scale(), field))]
+    return " ".join(fields[: units[-1]]), " ".join((*scales[:1], fields[units[-1]]))
+
+
+@cache
+def _scale() -> re.Pattern[str]:
+    """A field that tells the factor of a column: scale 0.001, factor=0.1."""
+    return re.compile(rf"(?:{lexicon().rows[RowKind.SCALE]})\W*(?P<factor>\d+(?:[.,]\d+)?)", re.IGNORECASE)
 
 
 def _words_and_unit(text: str) -> tuple[str, str]:

@@ -33,7 +33,7 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
     name += "".join(f" or {title(one)}" for one in finding.equivalents)
     name = f"Explains a part: {name}" if diagnosis.result.partial else f"{name[:1].upper()}{name[1:]}"
     turns = diagnosis.given_bench.axis.turns
-    page.heading(f"{index + 1}. {name}: {of_load(mechanism.element_of(term.variant), turns)}")
+    page.heading(of_load(f"{index + 1}. {name}: {mechanism.element_of(term.variant)}", turns))
     figure, caption = finding_figure(diagnosis, term)
     again = f"_{term.slot + 1}" if term.slot else ""
     page.picture(save(figure, folder / f"{term.effect}{again}.png"), of_load(caption, turns))

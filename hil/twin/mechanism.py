@@ -155,8 +155,10 @@ class Mechanism:
     variants: tuple[Variant, ...]
     text: Text
     search: SearchHints = SearchHints()
-    valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): name applies
-    # (values, axis) -> id and values of the mechanism that it is where its values are not valid; without: none
+    valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): can be there
+    # (values, axis) -> the law is another mechanism's there, a more frequent cause: its equal, and no name
+    is_another: Callable[[Sequence[float], AxisFacts], bool] | None = None
+    # (values, axis) -> id and values of the mechanism that it is where it is no name; without: none
     beyond: Callable[[Sequence[float], AxisFacts], tuple[str, tuple[float, ...]]] | None = None
     # (variant) -> id of a rarer cause whose first variant is the same torque on every motion; "" without one
     same_torque: Callable[[int], str] = lambda variant: ""
@@ -233,8 +235,11 @@ class Mechanism:
         return self.variants[variant].element or self.element
 
     def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-        """Check that the effect has a size, that the motion tells it, that its name applies, and that the sensors can
-        show it."""
+        """Check that the effect is possible, and that its name applies."""
+        return self.is_possible(values, variant, axis) and not (self.is_another and self.is_another(values, axis))
+
+    def is_possible(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+        """Check that the effect has a size, that the motion tells it, and that the sensors can show it."""
         if not self._has_size(values):
             return False
         if (self.told_by_m or self.wavelength_m)(values, axis) > axis.travel_m:

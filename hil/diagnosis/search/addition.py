@@ -14,7 +14,7 @@ from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
-from hil.diagnosis.search.initial_values import claimable, reads_wrong
+from hil.diagnosis.search.initial_values import claimable, possible, reads_wrong
 from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
@@ -115,6 +115,11 @@ class Addition:
         return claimable(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
 
     @cached_property
+    def possible(self) -> bool:
+        """True if the term can be there: else it is not even an equal of another."""
+        return possible(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
+
+    @cached_property
     def conditions(self) -> Ledger:
         """Answers of the rules on evidence, size and form."""
         return examine(ADDED, self, CRITERIA)
@@ -126,13 +131,13 @@ class Addition:
 
     @property
     def stands(self) -> bool:
-        """True if the term has evidence, is material, and can be the cause."""
-        return accepted(self.conditions)
+        """True if the term has evidence, is material, and can be named as the cause."""
+        return self.valid and accepted(self.conditions)
 
     @property
     def considered(self) -> Considered:
         """The candidate and its ledger; channels are in it where the choice has asked for them."""
-        more = (*self.conditions, *self.__dict__.get("harmless", ())) if self.valid else ()
+        more = (*self.conditions, *self.__dict__.get("harmless", ())) if self.possible else ()
         return Considered.of(self.fit.terms, (*examine(VALUES, self.valid, CRITERIA), *more))
 
 

@@ -229,6 +229,11 @@ def block_observed(effect: str, runs: Sequence[Measured]) -> bool:
 
 def claimable(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
     """True if the values are valid for the mechanism of a term, and the sensors can show it."""
-    return block_observed(term.effect, runs) and BY_ID[term.effect].is_valid(
-        term.values, term.variant, axis_facts(bench, runs)
-    )
+    valid = BY_ID[term.effect].is_valid
+    return block_observed(term.effect, runs) and valid(term.values, term.variant, axis_facts(bench, runs))
+
+
+def possible(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
+    """True if a term can be there, though the name of its law may be another mechanism's."""
+    can_be = BY_ID[term.effect].is_possible
+    return block_observed(term.effect, runs) and can_be(term.values, term.variant, axis_facts(bench, runs))

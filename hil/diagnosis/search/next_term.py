@@ -50,10 +50,10 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     """
     base, considered = search.base, list[Considered]()
 
-    def valid(fits: Sequence[Fit]) -> list[Addition]:
+    def possible(fits: Sequence[Fit]) -> list[Addition]:
         begun = [search.addition(fit) for fit in fits]
-        considered.extend(one.considered for one in begun if not one.valid)
-        return ordered([one for one in begun if one.valid])
+        considered.extend(one.considered for one in begun if not one.possible)
+        return ordered([one for one in begun if one.possible])
 
     if base.within_noise:
         promising = shown(base, candidates)
@@ -64,7 +64,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     additions = list[Addition]()
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
-        additions = valid(race(base, promising))
+        additions = possible(race(base, promising))
     best = first_standing(additions)
     unclear = best is None or best.fit.cost > CRITERIA.clear * base.cost
     if (
@@ -80,11 +80,11 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     if best is None and not base.at_floor and search.unfinished:
         step("searching again beside the parameters of the bench file")
         considered += [one.considered for one in additions]
-        additions = valid(from_bench_file(base))
+        additions = possible(from_bench_file(base))
         best = first_standing(additions)
     if best is not None and not best.fit.at_floor and search.unfinished and (other := companion(base, best.fit)):
         step(f"fitting {best.fit.terms[-1].effect} together with {other.effect}")
-        pairs = valid(together(base, best.fit, other))
+        pairs = possible(together(base, best.fit, other))
         clear = [pair for pair in pairs if pair.fit.cost < CRITERIA.clear * best.fit.cost]
         considered += [pair.considered for pair in pairs if pair not in clear]
         additions = ordered([*additions, *clear])

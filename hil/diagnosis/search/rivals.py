@@ -92,13 +92,13 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     converged = _ended(started, search)
     best = converged if converged.valid else started
     others = [_ended(one, search) if one.fit.cost < _NEAR * best.fit.cost else one for one in begun]
-    order = ordered([best, *(one for one in others if one.valid)])
+    order = ordered([best, *(one for one in others if one.possible)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
-    standing = [one for one in order if one is not best and not objection(one, best)]
+    standing = [one for one in order if one is not best and one.valid and not objection(one, best)]
     named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
-    considered = [one.considered for one in others if not one.valid]
+    considered = [one.considered for one in others if not one.possible]
     considered += [one.considered.asked(rival.ledger) for one, rival in compared]
     considered.append(replace(named.considered, added=True))
     return Choice(named, sorted((rival for _, rival in compared), key=lambda rival: rival.evidence), tuple(considered))

@@ -33,12 +33,15 @@ def _starts(s: Scene) -> list[tuple[float, ...]]:
     return [(1e-7, period_m, 0.0) for period_m in (*s.scale_periods, *lead)]
 
 
+def _of_the_screw(values: Sequence[float], axis: AxisFacts) -> bool:
+    """True with the period of the lead, a half or a third of it: a scale may have it, and every screw has."""
+    waves = 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * values[1])
+    return any(abs(waves / order - 1.0) < _OF_THE_SCREW for order in (1, 2, 3))
+
+
 def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the error is more than counting of the linear encoder makes, and that its period is not the lead."""
+    """Check that the error is more than counting of the linear encoder makes."""
     amplitude_m, period_m, _ = values
-    waves = 2.0 * math.pi * axis.ratio / (axis.angle_per_unit * period_m)
-    if any(abs(waves / order - 1.0) < _OF_THE_SCREW for order in (1, 2, 3)):
-        return False
     return not axis.table_count_m or period_m > _LONG_PERIOD_M or amplitude_m > _COUNTING * axis.table_count_m
 
 
@@ -59,4 +62,5 @@ MECHANISM = Mechanism(
     ),
     search=SearchHints(_starts, lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0), needs_table=True),
     valid=_valid,
+    is_another=_of_the_screw,
 )

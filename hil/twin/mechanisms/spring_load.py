@@ -17,9 +17,9 @@ def _pull_to_rest(value: float, at: Moment, parameters: Row, memory: Row) -> flo
     return value - parameters[0] * (at.table_position_m - parameters[1])
 
 
-# Travels beyond either end: the force of a spring that rests farther away is mostly constant. It is a weight; what is
-# left of its slope may be found as a spring beside it.
-_NEAR = 1.0
+# Travels beyond either end: the force of a spring that rests farther away is mostly constant, and told as a weight;
+# what is left of its slope may be found as a spring beside it. Farther than `_FAR` nothing tells it from a weight.
+_NEAR, _FAR = 1.0, 30.0
 
 
 def _starts(s: Scene) -> list[tuple[float, ...]]:
@@ -28,10 +28,20 @@ def _starts(s: Scene) -> list[tuple[float, ...]]:
     return [(stiffness, rest_m) for rest_m in (0.0, -20.0 * s.travel_m, 20.0 * s.travel_m, s.rest_m)]
 
 
-def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the rest position is near the travel."""
+def _away(values: Sequence[float], axis: AxisFacts) -> float:
+    """Distance of the rest position from the travel [m], negative within it."""
     first_m, last_m = axis.positions_m
-    return max(first_m - values[1], values[1] - last_m) < _NEAR * axis.travel_m
+    return max(first_m - values[1], values[1] - last_m)
+
+
+def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that the force depends on the position."""
+    return _away(values, axis) < _FAR * axis.travel_m
+
+
+def _is_weight(values: Sequence[float], axis: AxisFacts) -> bool:
+    """True for a force that is mostly constant."""
+    return _away(values, axis) >= _NEAR * axis.travel_m
 
 
 def _weight(values: Sequence[float], axis: AxisFacts) -> tuple[str, tuple[float, ...]]:
@@ -54,5 +64,6 @@ MECHANISM = Mechanism(
     text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.FORCE_OVER_TRAVEL),
     search=SearchHints(_starts, lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     valid=_valid,
+    is_another=_is_weight,
     beyond=_weight,
 )

@@ -225,7 +225,7 @@ def test_a_damaged_source_is_refused(tmp_path: Path, ending: str, columns: dict[
     ],
 )
 def test_another_file_is_refused(tmp_path: Path, name: str, message: str) -> None:
-    (tmp_path / name).write_bytes(b"something else")
+    (tmp_path / name).write_bytes(b"PK\x03\x04\x14\x00")
     with pytest.raises(InputError, match=message):
         import_recording(tmp_path / name, write_map(tmp_path))
     with pytest.raises(InputError, match="there is no such file"):

@@ -44,7 +44,7 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
     "a zip archive": ("csv", content(b"PK\x03\x04" + RANDOM.bytes(4000)), "binary"),
     "an image": ("csv", content(b"\x89PNG\r\n\x1a\n\x00\x00" + RANDOM.bytes(4000)), "binary"),
     "a spreadsheet": ("xlsx", content(b"PK\x03\x04"), "ending '.xlsx' cannot be imported"),
-    "no ending": ("", text(TEXT), "cannot be imported"),
+    "a binary file without an ending": ("", content(b"PK\x03\x04" + RANDOM.bytes(4000)), "cannot be imported"),
     "one column": ("csv", text("torque\n" + "1.5\n" * 100), "two columns"),
     "a cut last row": ("csv", text(TEXT[:-12]), "given [123] fields|no number"),
     "half of a row in the middle": ("csv", with_lines((1500, LINES[1500][:9])), "1501|no number"),

@@ -91,6 +91,23 @@ def test_steps_that_an_encoder_follows_are_the_motion(tmp_path: Path, command: s
     assert table / motor == pytest.approx(0.375)
 
 
+@pytest.mark.parametrize("unit", ["[1/16 step]", "(usteps)", "Schritte"])
+def test_a_unit_of_steps_says_that_the_set_points_count_them(tmp_path: Path, unit: str) -> None:
+    counts = np.round(AXIS["angle"] / (2 * np.pi) * 4000)
+    columns = {"t": T, "cmd": STEPS, "enc_motor": counts, "scale": np.round(5e3 * AXIS["angle"] / (2 * np.pi))}
+    source = tmp_path / "log.txt"
+    names, *rows = csv_text(columns).splitlines()
+    source.write_text("\n".join([names, f"[s],{unit},[counts],[um]", *rows]) + "\n")
+    draft = draft_map(source)
+    assert column_of(draft, "motor_position_rad") == "enc_motor"
+    command = next(one for one in draft.channels if one.channel == "position_command_m")
+    assert draft.lead_m is not None
+    turns = np.ptp(STEPS) / 6400.0
+    per_count = float(str(command.entry["scale"])) * draft.lead_m / (2.0 * np.pi)  # rad of the motor as travel
+    assert np.ptp(STEPS) * per_count == pytest.approx(5e-3 * turns, rel=1e-3)
+    assert draft.asked == []
+
+
 def test_steps_beside_a_linear_scale_tell_all_but_the_lead(tmp_path: Path) -> None:
     """Delay, lost motion and scale of an axis without a torque; the travel per turn is asked."""
     folder, source, late = tmp_path / "out", tmp_path / "log.csv", 0.004

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from foreign_axis import LEAD_M, axis, csv_text, renamed
 
@@ -125,3 +126,36 @@ def test_attributes_of_an_xml_file_may_be_german(tmp_path: Path) -> None:
     assert (found["motor_position_rad"]["column"], found["motor_position_rad"]["unit"]) == ("Lageistwert", "rad")
     current = next(entry for entry in found.values() if entry["column"] == "Stromsollwert")
     assert (current["unit"], current["scale"]) == ("A", 0.001)
+
+
+CHANNEL_LIST = """*** DRIVE TRACE ***
+Device;ZX-210
+SamplePeriod;1.000 ms
+CH1;P-0-0051;Pos.feedback 1;mm;scale 0.001
+CH2;S-0-0047;Pos.command;mm;scale 0.001
+CH3;S-0-0040;Vel.feedback;rpm;factor=0.1
+CH4;S-0-0084;Torque feedback;Nm;scale 0.01
+[DATA]
+"""
+
+
+@pytest.mark.parametrize(
+    ("names", "ending"), [("#;CH1;CH2;CH3;CH4", "trc"), ("No;CH1;CH2;CH3;CH4", "txt"), ("#;CH1;CH2;CH3;CH4", "")]
+)
+def test_rows_that_describe_a_channel_each_are_no_names(tmp_path: Path, names: str, ending: str) -> None:
+    """As many fields as the columns have; unit and factor of each channel, in a file with an ending of its own."""
+    columns = [1e3 * AXIS["x_act"], 1e3 * AXIS["x_set"], AXIS["speed"] * 300.0 / np.pi, AXIS["torque"] * 100.0]
+    whole = [[index, *(round(float(one[index])) for one in columns)] for index in range(AXIS["t"].size)]
+    source = tmp_path / f"trace.{ending}".rstrip(".")
+    source.write_text(CHANNEL_LIST + names + "\n" + "".join(";".join(map(str, row)) + "\n" for row in whole))
+    draft = draft_map(source)
+    entries = {one.channel: one.entry for one in draft.channels}
+    assert {name: str(entry["column"]) for name, entry in entries.items()} == {
+        "motor_position_rad": "CH1",
+        "position_command_m": "CH2",
+        "torque_n_m": "CH4",
+    }
+    assert entries["motor_position_rad"]["unit"] == "mm"
+    assert entries["motor_position_rad"]["scale"] == pytest.approx(1e-3)
+    assert entries["torque_n_m"]["scale"] == pytest.approx(1e-2)
+    assert draft.lead_m == pytest.approx(LEAD_M)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from geared_axis import geared
 
 from hil.bench.bench_file import MechanismEntry, load_bench
 from hil.diagnosis.search.facts import axis_facts
-from hil.diagnosis.search.initial_values import claimable, likenesses, observable
+from hil.diagnosis.search.initial_values import claimable, likenesses, observable, possible
 from hil.diagnosis.search.score_test import offered
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
@@ -150,10 +151,24 @@ def test_a_weight_above_coulomb_friction_is_no_friction() -> None:
     assert claimable(Term("constant_load", 0, (3.0 * COULOMB_N_M,)), OWNER)
 
 
-@pytest.mark.parametrize(("rest_m", "spring"), [(0.11, True), (-0.05, True), (-0.07, False), (10.0, False)])
-def test_a_spring_that_rests_out_of_reach_is_a_load(train: Dataset, rest_m: float, spring: bool) -> None:
-    """The travel is 60 mm."""
-    assert claimable(Term("spring_load", 0, (20.0, rest_m)), OWNER, train.runs) is spring
+@pytest.mark.parametrize(
+    ("rest_m", "named", "there"),
+    [(0.11, True, True), (-0.05, True, True), (-0.07, False, True), (1.7, False, True), (10.0, False, False)],
+)
+def test_a_spring_that_rests_out_of_reach_is_a_load(train: Dataset, rest_m: float, named: bool, there: bool) -> None:
+    """The travel is 60 mm. Where the force still depends on the position, the spring is an equal of the load."""
+    spring = Term("spring_load", 0, (20.0, rest_m))
+    assert claimable(spring, OWNER, train.runs) is named
+    assert possible(spring, OWNER, train.runs) is there
+
+
+@pytest.mark.parametrize(("of_lead", "named"), [(1.0, False), (0.5, False), (0.2, True)])
+def test_an_error_with_the_period_of_the_lead_is_one_of_the_screw(train: Dataset, of_lead: float, named: bool) -> None:
+    """A scale may have that period, so that it is an equal."""
+    lead_m = 2.0 * math.pi * OWNER.axis.ratio_m_rad
+    error = Term("scale_interpolation_error", 0, (5e-6, of_lead * lead_m, 0.0))
+    assert claimable(error, OWNER, train.runs) is named
+    assert possible(error, OWNER, train.runs)
 
 
 @pytest.mark.parametrize(

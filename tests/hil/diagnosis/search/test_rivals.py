@@ -51,7 +51,8 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     assert not rival.tied
     assert choice.considered[0].ledger[-1].text == "it is excluded"
 
-    monkeypatch.setattr(addition, "claimable", lambda term, *_: term.effect != LOAD.effect)
+    for name in ("claimable", "possible"):
+        monkeypatch.setattr(addition, name, lambda term, *_: term.effect != LOAD.effect)
     choice = chosen(wrong, [search.addition(fits[0]), wrong], search)
     assert choice.rivals == []
     assert [(one.rule, one.accepted) for one in choice.considered[0].ledger] == [("values", False)]
@@ -83,6 +84,7 @@ def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: 
         "unrepeated": (0.0, 0.0),
         "inside": None,
         "torque": None,
+        "valid": True,
     }.items():
         monkeypatch.setattr(Addition, name, value)
     search = SearchRound(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))

@@ -1,0 +1,22 @@
+"""Comments on keys of a YAML file that its owner did not write."""
+
+import pytest
+import yaml
+
+from hil.files.yaml_edit import YamlChange, with_changes
+
+BLOCK = "axis:\n  table_mass_kg: 80.0   # owner\ncontrol:\n  law: unknown\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (BLOCK, BLOCK.replace("# owner\n", "# owner\n  # damping_ratio: not told\n")),
+        ("axis: {table_mass_kg: 80.0}\n", "axis: {table_mass_kg: 80.0}   # damping_ratio: not told\n"),
+    ],
+)
+def test_a_comment_on_a_key_that_the_file_lacks_adds_no_value(text: str, expected: str) -> None:
+    """A default stays one: with null in its place the file was refused, and written anew without its comments."""
+    changed = with_changes(text, [YamlChange(("axis", "damping_ratio"), None, "not told")])
+    assert changed == expected
+    assert yaml.safe_load(changed) == yaml.safe_load(text)

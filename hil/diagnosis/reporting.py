@@ -1,6 +1,7 @@
 """Report a verdict: location, findings, figures, the next experiment, notes, and the statement."""
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -149,6 +150,13 @@ def _unnamed(one: UnnamedTerm, judged: Judged) -> Unnamed:
     )
 
 
+def _times(ratios: Sequence[float]) -> str:
+    """Largest rms over the noise of a channel, and in how many of the recordings it is above, if not in all."""
+    above = sum(ratio > FLOOR for ratio in ratios)
+    where = f" in {above} of {len(ratios)} recordings or parts" if above < len(ratios) else ""
+    return f"{digits(max(ratios) ** 0.5)} times{where}"
+
+
 def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
     """Unexplained share of the energy above the floor, and the channels above their noise."""
     final, held_out, change = judged.final, judged.tested.searched.prepared.held_out, judged.change
@@ -159,18 +167,18 @@ def _unexplained(judged: Judged, location: Location | None) -> Unexplained:
     fits: tuple[Fit, ...] = final.on(final.data), final.on(held_out)
     if change:
         share, fits = change.left, change.parts
-    worst: dict[str, float] = {}
+    found: dict[str, list[float]] = {}
     names = channel_names(final.bench, final.data.runs[0])
     for fit in fits:
         for ratios in fit.noise_ratios:
             for name, ratio in ratios.items():
-                worst[names[name]] = max(worst.get(names[name], 0.0), ratio)
-    above = {name: float(np.sqrt(ratio)) for name, ratio in worst.items() if ratio > FLOOR}
+                found.setdefault(names[name], []).append(ratio)
+    above = {name: float(np.sqrt(max(ratios))) for name, ratios in found.items() if max(ratios) > FLOOR}
     if not above:
         return Unexplained(share=share, description=AT_FLOOR)
     quiet = {names[name] for name in alike}
     text = ", ".join(
-        f"{spoken(name)} {digits(above[name])} times" + (f" {NO_STRUCTURE}" if name in quiet else "")
+        f"{spoken(name)} {_times(found[name])}" + (f" {NO_STRUCTURE}" if name in quiet else "")
         for name in sorted(above, key=lambda n: -above[n])
     )
     if judged.of_plant is Verdict.UNEXPLAINED and not final.terms and location is not None:

@@ -49,7 +49,10 @@ def print_diagnosis(result: Result) -> None:
 def _size(finding: Finding) -> str:
     """The first parameter of a finding, its strength; empty for windows, which have one each."""
     first = next(iter(finding.parameters.values()), None)
-    return "" if first is None else known_quantity(first.value, first.std or 0.0, first.unit)
+    if first is None:
+        return ""
+    told = not first.std or abs(first.value) >= first.std
+    return known_quantity(first.value, first.std or 0.0, first.unit) if told else "not told by itself"
 
 
 def torque_line(left: TorqueLeft) -> str:

@@ -48,6 +48,7 @@ _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
 _ORDER = 24  # of the autoregressive model: as that of `hil.identification.inference`
 _RIDGE = 1e-4  # of white noise in the autocovariance: a filter that takes off a hundredth of the rms is far enough
+_LARGEST = 1e150  # of a residual: an unstable twin leaves more, and its square overflows
 _UNDERFLOW = 1e-290  # probability below which its floating-point number loses digits
 _RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
@@ -74,11 +75,10 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
     for channel, own in asked.channels.items():
         after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
         shape = own.quiet - after
-        if not np.isfinite(shape).all():
+        if not _holds(shape):
             continue
-        beside = own.beside[:, ~own.constant] if offset else own.beside
-        matrix, laps = np.column_stack([shape, beside]), [run.laps for run in without.data.runs]
-        size, ratio, free = _first_coefficient(matrix, own.measured, own.rows, laps)
+        matrix = np.column_stack([shape, own.beside[:, ~own.constant] if offset else own.beside])
+        size, ratio, free = _first_coefficient(matrix, own.measured, own.rows, [run.laps for run in without.data.runs])
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             if fitted:
                 removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
@@ -158,18 +158,23 @@ def _asked(without: Fit) -> _Asked | None:
         rows = [one.rows for one in parts]
         measured = _joined(parts, rows)
         own = _joined(left_in_channel(hypothesis, quiet, channel, plain), rows)
-        if measured.size < _FEWEST_ROWS or not (np.isfinite(measured).all() and np.isfinite(own).all()):
+        if measured.size < _FEWEST_ROWS or not (_holds(measured) and _holds(own)):
             continue
         beside = [np.ones_like(measured)]
         if channel == TORQUE:
             moved = [plain_columns(measured_motion(run).moved) for run in data.runs]
             beside += [np.concatenate([one[name][at] for one, at in zip(moved, rows, strict=True)]) for name in MOTION]
         changed = (_joined(left_in_channel(one, quiet, channel, plain), rows) - own for one in _other_values(without))
-        beside += [change for change in changed if np.isfinite(change).all()]
+        beside += [change for change in changed if _holds(change)]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
         columns = np.column_stack(beside)
         found[channel] = _Seen(rows, measured, own, columns, np.ptp(columns, axis=0) == 0.0, least)
     return _Asked(found, plain, quiet)
+
+
+def _holds(residual: FloatArray) -> bool:
+    """True if a twin holds the motion: its residual (n,) has squares that are floating-point numbers."""
+    return bool(np.max(np.abs(residual), initial=0.0) < _LARGEST)
 
 
 def _other_values(fit: Fit) -> Iterator[Hypothesis]:

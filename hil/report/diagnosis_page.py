@@ -32,7 +32,9 @@ def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> No
     page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result), LEGEND)
     findings_section(page, diagnosis, folder)
     _change(page, diagnosis, folder)
-    if result.location is not None:
+    # below the noise of a row no row tells where: the structure does
+    nameless = result.verdict is Verdict.UNEXPLAINED and not result.findings
+    if result.location is not None and not (nameless and result.unexplained.description == AT_FLOOR):
         page.heading("Where it is")
         page.items(
             [

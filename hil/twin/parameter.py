@@ -95,7 +95,7 @@ def default_starts(parameter: Parameter, scene: Scene) -> list[float]:
         Role.PHASE: [0.0],
         Role.ORDER: scene.orders,
         Role.PERIOD: scene.friction_periods,
-        Role.EDGE: [scene.window[0]],
+        Role.EDGE: [scene.windows[0][0]],
     }
     if parameter.role in by_role:
         return by_role[parameter.role]

@@ -69,7 +69,7 @@ class Scene:
     friction_zones: list[tuple[float, float, float]]  # from, to [m], friction above the rest of the travel [N m]
     scale_periods: list[float]  # of the table residual [m]
     lines_hz: list[float]  # of the disturbance torque over time
-    window: tuple[float, float, float]  # start, end, level [N m]
+    windows: list[tuple[float, float, float]]  # start, end, level [N m], the most significant first; at least one
     rest_m: float  # position at which a straight line through the disturbance torque over the position is 0
     stretch: float  # table against motor [m], typical
     most_stretch: float  # and largest

@@ -155,15 +155,21 @@ def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:
     return [1.0 / wave_s for wave_s in strongest_periods(time_s, left, run.period_s, 1.0 / _PASS_HZ, most)]
 
 
-def force_window(run: Measured, d: Disturbance) -> tuple[float, float, float]:
-    """Start, end [s] and level [motor units] of the most significant constant disturbance."""
+def force_windows(run: Measured, d: Disturbance, most: int = 3) -> list[tuple[float, float, float]]:
+    """Start, end [s] and level [motor units] of the most significant constant disturbances, best first, none within
+    another; at least one."""
     block = max(int(0.02 / run.period_s), 1)
     n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
-    first, last, level = max(_levels(values, mask.sum(axis=1, dtype=np.float64)), key=lambda one: one.score)[:3]
-    scale = block * run.period_s
-    return first * scale, last * scale, level
+    counts, scale, found = mask.sum(axis=1, dtype=np.float64), block * run.period_s, list[tuple[float, float, float]]()
+    while len(found) < most:
+        best = max(_levels(values, counts), key=lambda one: one.score)
+        if found and not best.score > 0.0:
+            break
+        found.append((best.first * scale, best.last * scale, best.level))
+        values[best.first : best.last] = counts[best.first : best.last] = 0.0
+    return found
 
 
 def friction_zones(

@@ -61,7 +61,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     ]
     stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
-    first_s, last_s, level = estimate.force_window(runs[longest], disturbances[longest])
+    begin_s, events = runs[longest].start.time_s, estimate.force_windows(runs[longest], disturbances[longest])
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     facts = axis_facts(bench, runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
@@ -101,7 +101,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),
         lines_hz=estimate.lines_hz(runs[longest], disturbances[longest]),
-        window=(runs[longest].start.time_s + first_s, runs[longest].start.time_s + last_s, level),
+        windows=[(begin_s + first_s, begin_s + last_s, level) for first_s, last_s, level in events],
         rest_m=estimate.rest_position(runs, disturbances, ratio),
         stretch=max(min(stretch, facts.lost_m), 0.5e-6),
         most_stretch=max(min(most_stretch, facts.lost_m), 1e-6),

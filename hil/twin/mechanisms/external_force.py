@@ -55,7 +55,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TABLE_FORCE, _push),),
     text=Text(_ONE, Picture.FORCE, of_windows=_sentence),
     search=SearchHints(
-        lambda s: [(s.window[2] / s.ratio or 1.0, s.window[0], s.window[1])],
+        lambda s: [(level / s.ratio or 1.0, start_s, end_s) for start_s, end_s, level in s.windows],
         lambda a: (0.2 * a.friction / a.ratio, 0.5 * a.duration_s, 0.5 * a.duration_s + 1.0),
     ),
     over_time=_pushes,

@@ -184,7 +184,7 @@ def _transmission(run: Measured, bench: Bench, scene: Scene) -> BlockEquation:
 
 
 def _window(time_s: FloatArray, scene: Scene) -> FloatArray:
-    start_s, end_s, _ = scene.window
+    start_s, end_s, _ = scene.windows[0]
     return np.asarray((time_s >= start_s) & (time_s < end_s), dtype=np.float64)
 
 

@@ -10,7 +10,14 @@ import pytest
 from concealed_run import concealed_run
 from diagnosis_runs import bench
 
-from hil.diagnosis.search.disturbance import Disturbance, friction_zones, lines_hz, other_orders, scale_periods
+from hil.diagnosis.search.disturbance import (
+    Disturbance,
+    force_windows,
+    friction_zones,
+    lines_hz,
+    other_orders,
+    scale_periods,
+)
 from hil.identification.measured import take
 
 OWNER = bench()
@@ -30,6 +37,22 @@ def test_the_zone_is_estimated_from_the_torque_against_the_motion(level: float) 
     assert (begin_m, end_m) == pytest.approx((0.22, 0.30), abs=3e-3)
     assert abs(found) <= abs(level)
     assert found * level > 0.0
+
+
+def test_each_of_several_windows_of_a_force_is_where_a_search_may_begin() -> None:
+    run = take(concealed_run(OWNER, {}), OWNER)
+    time_s, sliding = np.arange(run.motor.size) * run.period_s, np.ones(run.motor.size, dtype=bool)
+    pushed = [(0.2, 0.35), (0.6, 0.7)]
+    whole_s = time_s[-1]
+    torque = np.random.default_rng(4).normal(0.0, 0.1, time_s.size)
+    for begin, end in pushed:
+        torque[(time_s >= begin * whole_s) & (time_s < end * whole_s)] -= 0.3
+    found = force_windows(run, Disturbance(torque, np.ones(time_s.size), sliding))
+    for (begin, end), (first_s, last_s, level) in zip(pushed, found, strict=False):
+        assert (first_s, last_s) == pytest.approx((begin * whole_s, end * whole_s), abs=0.02 * whole_s)
+        assert level == pytest.approx(-0.3, abs=0.1)
+    still = Disturbance(torque, np.zeros(time_s.size), np.zeros(time_s.size, dtype=bool))
+    assert len(force_windows(run, still)) == 1
 
 
 def test_lines_are_those_of_the_disturbance_over_time() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Container
 
 from hil.bench.bench_file import Bench
 from hil.channels import AXIS_CHANNELS
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import ChannelFit, Mode, TorqueLeft, Verdict
 from hil.diagnosis.stages import Judged, Searched
 from hil.diagnosis.wording import title, titles
@@ -107,8 +108,8 @@ def on_fit(final: Fit) -> list[str]:
 
 
 def on_torque(left: TorqueLeft | None) -> list[str]:
-    """Note if the twin predicts the torque of held-out motion worse than the plain model does."""
-    if left is None or left.final is None or left.final <= left.plain:
+    """Note if the twin predicts the torque of held-out motion worse than the plain model does, by the rule on it."""
+    if left is None or left.final is None or left.final - left.plain <= CRITERIA.discrepancy:
         return []
     return [
         f"On held-out motion the twin leaves {percent(left.final)} of the torque's standard deviation, more than plain "

@@ -14,6 +14,7 @@ from hil.identification.least_squares import SIGMAS
 from hil.quantities import percent, quantity
 
 MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effect; the table has all
+_MORE = 1.1  # times what plain least squares leave, from which a reader asks
 
 
 def statement(result: Result) -> str:
@@ -153,9 +154,11 @@ def _leaves(left: TorqueLeft | None) -> str:
     """The share of the torque that a twin leaves, and plain least squares, as a verb; empty if it is not known."""
     if left is None or left.final is None:
         return ""
+    more = _MORE * left.plain < left.final <= left.plain + CRITERIA.discrepancy
+    by_far = f" (right models differ by up to {percent(CRITERIA.discrepancy)})" if more else ""
     return (
         f"leaves {percent(left.final)} of the torque on held-out motion unexplained, plain least squares "
-        f"{percent(left.plain)}"
+        f"{percent(left.plain)}{by_far}"
     )
 
 

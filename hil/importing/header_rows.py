@@ -37,6 +37,11 @@ class HeaderRow:
     whole: bool
 
     @property
+    def first(self) -> str:
+        """First field that is not empty."""
+        return next(one for one in self.fields if one)
+
+    @property
     def sure(self) -> int:
         """Number of different fields that say a quantity."""
         return len({one for one in self.fields if one and label(one).sure})
@@ -131,14 +136,16 @@ def _below_padded(rows: list[HeaderRow]) -> list[HeaderRow]:
 def _without_list(rows: list[HeaderRow]) -> list[HeaderRow]:
     """Rows without those that each describe a column by its name in another row: CH1;Pos;mm over #;CH1;CH2."""
     for row in rows:
-        described = [one for one in rows if one is not row and one.fields[0] and one.fields[0] in row.fields[1:]]
-        if len({one.fields[0] for one in described}) > 1:
-            return [one for one in rows if one not in described]
+        described = {one.line: one.first for one in rows if one is not row and one.first in row.fields}
+        if len(set(described.values())) > 1:
+            return [one for one in rows if one.line not in described]
     return rows
 
 
 def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, counted: bool) -> HeaderRow | None:
     text = COMMENT.sub("", line)
+    if len(split_line(text, delimiter)) < width == len(split_line(line, delimiter)):
+        text = line.replace("#", "", 1)  # over a column that numbers the rows
     word, colon, rest = text.partition(":")
     kind = _kind_of_label(word) if colon and delimiter not in word else None
     fields = split_line(rest if kind else text, delimiter)

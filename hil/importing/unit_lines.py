@@ -74,7 +74,8 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
     match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
     if match is None:
         return None
-    fields = [field.strip(' "') for field in re.split(r"[;,\t|]", match[1])]
+    separator = r"[;\t|]" if re.search(r"[;\t|]", match[1]) else ","  # a comma may be the decimal mark
+    fields = [field.strip(' "') for field in re.split(separator, match[1])]
     bracket = _BRACKET.search(match[1])
     if bracket and (unit_named(bracket[1]) or factor_and_unit(bracket[1])):
         return match[1][: bracket.start()].strip(), bracket[1]
@@ -82,7 +83,8 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
     if not units:
         return None
     scales = [scale["factor"] for field in fields if (scale := re.fullmatch(_scale(), field))]
-    return " ".join(fields[: units[-1]]), " ".join((*scales[:1], fields[units[-1]]))
+    words = next((one for one in fields[: units[-1]] if label(one).sure), fields[0])
+    return words, " ".join((*scales[:1], fields[units[-1]]))
 
 
 @cache

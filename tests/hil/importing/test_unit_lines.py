@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -140,14 +141,23 @@ CH4;S-0-0084;Torque feedback;Nm;scale 0.01
 
 
 @pytest.mark.parametrize(
-    ("names", "ending"), [("#;CH1;CH2;CH3;CH4", "trc"), ("No;CH1;CH2;CH3;CH4", "txt"), ("#;CH1;CH2;CH3;CH4", "")]
+    ("names", "ending", "delimiter", "mark"),
+    [
+        ("#;CH1;CH2;CH3;CH4", "trc", ";", "."),
+        ("No;CH1;CH2;CH3;CH4", "txt", ";", "."),
+        ("#;CH1;CH2;CH3;CH4", "", ";", ","),
+        ("#;CH1;CH2;CH3;CH4", "trc", "\t", "."),
+    ],
 )
-def test_rows_that_describe_a_channel_each_are_no_names(tmp_path: Path, names: str, ending: str) -> None:
+def test_rows_that_describe_a_channel_each_are_no_names(
+    tmp_path: Path, names: str, ending: str, delimiter: str, mark: str
+) -> None:
     """As many fields as the columns have; unit and factor of each channel, in a file with an ending of its own."""
     columns = [1e3 * AXIS["x_act"], 1e3 * AXIS["x_set"], AXIS["speed"] * 300.0 / np.pi, AXIS["torque"] * 100.0]
     whole = [[index, *(round(float(one[index])) for one in columns)] for index in range(AXIS["t"].size)]
     source = tmp_path / f"trace.{ending}".rstrip(".")
-    source.write_text(CHANNEL_LIST + names + "\n" + "".join(";".join(map(str, row)) + "\n" for row in whole))
+    above = CHANNEL_LIST.replace("0.", f"0{mark}") + names + "\n"
+    source.write_text((above + "".join(";".join(map(str, row)) + "\n" for row in whole)).replace(";", delimiter))
     draft = draft_map(source)
     entries = {one.channel: one.entry for one in draft.channels}
     assert {name: str(entry["column"]) for name, entry in entries.items()} == {
@@ -159,3 +169,17 @@ def test_rows_that_describe_a_channel_each_are_no_names(tmp_path: Path, names: s
     assert entries["motor_position_rad"]["scale"] == pytest.approx(1e-3)
     assert entries["torque_n_m"]["scale"] == pytest.approx(1e-2)
     assert draft.lead_m == pytest.approx(LEAD_M)
+
+
+def test_a_list_of_channels_with_a_field_less_than_the_rows_gives_their_units(tmp_path: Path) -> None:
+    columns = [AXIS["x_act"], AXIS["x_set"], AXIS["speed"] * 30.0 / np.pi, AXIS["torque"]]
+    above = re.sub(r";(scale|factor).*", "", CHANNEL_LIST) + "#;CH1;CH2;CH3;CH4\n"
+    rows = (";".join([str(index), *(f"{one[index]:.6g}" for one in columns)]) for index in range(AXIS["t"].size))
+    source = tmp_path / "trace.csv"
+    source.write_text(above + "\n".join(rows) + "\n")
+    draft = draft_map(source)
+    assert {one.channel: one.entry["unit"] for one in draft.channels} == {
+        "motor_position_rad": "mm",
+        "position_command_m": "mm",
+        "torque_n_m": "N m",
+    }

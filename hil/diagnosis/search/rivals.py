@@ -18,13 +18,11 @@ from hil.diagnosis.ledger import Considered, Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition
 from hil.diagnosis.search.initial_values import reads_wrong
 from hil.diagnosis.search.next_term import SearchRound, first_standing, ordered
-from hil.diagnosis.search.shape import log_chance_of_shape
 from hil.identification.coordinates import LAST_EDGE_STEP_S
 from hil.identification.estimator import Fit, FitStatus
 from hil.identification.inference import Filter, bic_gain, bic_margin, refuted, whitening
 from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
-from hil.twin.physics import Active
 
 _NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
 ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
@@ -168,20 +166,7 @@ def _evidence(named: Addition, one: Addition, margin: Callable[[Fit, Fit], float
     """Evidence for an explanation against another: the margin of their fits, below the noise that of their shapes."""
     if one.log_chance is None or named.log_chance is None:
         return margin(named.fit, one.fit)
-    return 2.0 * (_log_chance(one, named) - _log_chance(named, one))
-
-
-def _log_chance(one: Addition, other: Addition) -> float:
-    """Logarithm of the chance of a shape beside another; where that is an offset, none is a nuisance of either.
-
-    Gravity over a short way is an offset, and little else.
-    """
-    own, by_offset = one.log_chance or 0.0, _is_offset(other.fit.terms[-1]) and not _is_offset(one.fit.terms[-1])
-    return log_chance_of_shape(one.fit.hypothesis, one.base, offset=True) if by_offset else own
-
-
-def _is_offset(term: Term) -> bool:
-    return Active(term.effect, term.values, term.variant).is_offset
+    return 2.0 * (one.log_chance - named.log_chance)
 
 
 def _refuted(evidence: float, one: Addition, named: Addition) -> bool:

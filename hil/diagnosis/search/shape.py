@@ -58,19 +58,20 @@ def log_chance_below_noise(fit: Fit, without: Fit) -> float | None:
     return log_chance_of_shape(fit.hypothesis, without) if without.within_noise else None
 
 
-def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True, offset: bool = False) -> float:
+def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> float:
     """Logarithm of the probability that chance makes the shape of one of all mechanisms in what a fit leaves.
 
     By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than what correct
     simulations of one axis differ by, and for a `fitted` shape that leaves more at its own size: of the size c the term
-    has 1, and removes (2 c - 1) / c^2 of what the shape removes. An `offset` that is a term is no nuisance.
+    has 1, and removes (2 c - 1) / c^2 of what the shape removes.
     """
     asked, best = _asked(without), 0.0
     if asked is None:
         return best
     added = _added(found, without)
     searched, (shaped, share) = _searched(found) - _searched(without.hypothesis), _faint(found, added, without)
-    offset = offset or any(Active(term.effect, term.values, term.variant).is_offset for term in added)
+    # then one is the shape, and no nuisance
+    offset = any(Active(term.effect, term.values, term.variant).is_offset for term in added)
     for channel, own in asked.channels.items():
         after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
         shape = own.quiet - after

@@ -54,23 +54,6 @@ def test_a_shape_of_the_opposite_sign_is_told_only_before_it_is_fitted() -> None
     assert log_chance_of_shape(begun.hypothesis, without, fitted=False) < NEEDED
 
 
-def test_what_is_mostly_an_offset_is_compared_with_one_in_the_same_regression() -> None:
-    """A spring that rests far away is a weight, as gravity is over a short way: an offset is a nuisance of neither."""
-    load = 0.15
-    without = base(Term("constant_load", 0, (load,)))
-    ratio = OWNER.axis.ratio_m_rad
-    away_m = 1.5
-    spring = Term("spring_load", 0, (load / ratio / away_m, -away_m))
-    constant, mostly = (
-        without.estimator.evaluate(without.hypothesis.with_term(term)).hypothesis
-        for term in (Term("constant_load", 0, (load,)), spring)
-    )
-    alike = log_chance_of_shape(constant, without)
-    assert alike < NEEDED
-    assert log_chance_of_shape(mostly, without) > 0.5 * alike
-    assert log_chance_of_shape(mostly, without, offset=True) == pytest.approx(alike, rel=0.1)
-
-
 def test_a_delay_or_a_resonance_that_passes_less_noise_is_not_told() -> None:
     without = base(COGGING)
     for term in (DELAY, MODE):

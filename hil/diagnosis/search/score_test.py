@@ -18,7 +18,7 @@ from scipy.linalg import qr
 from hil.arrays import FloatArray
 from hil.diagnosis.search.event_detection import detect
 from hil.diagnosis.search.events import EVENTS, event_term
-from hil.diagnosis.search.initial_values import StartPoint, possible, scene, starts
+from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import correlation_time, whitened, whitening
@@ -124,7 +124,7 @@ def screen_library(base: Fit) -> list[Candidate]:
     # a tuned start replaces the grid of its mechanism
     tuned = {effect: _tuned(base, same[0], views) for effect, same in best.items()}
     best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
-    valid = partial(possible, bench=base.bench, runs=base.data.runs)
+    valid = partial(claimable, bench=base.bench, runs=base.data.runs)
 
     def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
         slot, scaled = free_slot(effect, terms), BY_ID[effect].search.proportional

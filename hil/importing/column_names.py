@@ -71,6 +71,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     index = _INDEX.search(name if unit else column.strip())
     known = lexicon()
     of_steps = odd and _counts_steps(f"{unit_text} {column}", known.steps)
+    of_steps = of_steps and not _any(words, known.measured) and not _any(words, known.motor)
     odd = odd and index is None and not of_steps
     # of a path the last words count: pid.x.output, /joint_states/joint1/position
     parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]

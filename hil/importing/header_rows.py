@@ -144,7 +144,7 @@ def _without_list(rows: list[HeaderRow]) -> list[HeaderRow]:
 
 def _row(index: int, line: str, delimiter: str, width: int, form: NumberForm, counted: bool) -> HeaderRow | None:
     text = COMMENT.sub("", line)
-    if len(split_line(text, delimiter)) < width == len(split_line(line, delimiter)):
+    if counted and len(split_line(text, delimiter)) < width == len(split_line(line, delimiter)):
         text = line.replace("#", "", 1)  # over a column that numbers the rows
     word, colon, rest = text.partition(":")
     kind = _kind_of_label(word) if colon and delimiter not in word else None

@@ -207,7 +207,7 @@ _CHANNELS: Rule[Addition | Ablation] = Rule(
     _channels,
 )
 VALUES: tuple[Rule[bool], ...] = (
-    # the condition of each mechanism (`Mechanism.is_valid`): else its name does not apply
+    # the condition of each mechanism (`Mechanism.is_claimable`): else its name does not apply
     Rule(
         "values",
         "its values are valid for the mechanism, and its block is observed",

@@ -64,6 +64,7 @@ def with_changes(text: str, changes: Sequence[YamlChange]) -> str:
                 value = {name: value}
             if not isinstance(node, yaml.MappingNode):
                 raise ValueError(f"{change.path}: the file has no mapping there")
+            key = ".".join(map(str, lacking)) if change.value is None else key
             entry = f"# {key}" if change.value is None else f"{key}: {_flow(value)}"
             parent, line = node, _end(node).line
             if not node.flow_style:

@@ -1,12 +1,13 @@
 """Read the name of a column: quantity, set-point or measured, motor or table, unit. The words are in `lexicon.yaml`."""
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
 from hil.importing.units import (
     QUANTITY_OF_UNIT,
+    counts_steps,
     split_unit,
     unit_named,
     unit_of_part,
@@ -70,7 +71,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     words = _words(tokens) + beside
     index = _INDEX.search(name if unit else column.strip())
     known = lexicon()
-    of_steps = odd and _counts_steps(f"{unit_text} {column}", known.steps)
+    of_steps = odd and counts_steps(unit_text or column.strip()[len(name) :])
     of_steps = of_steps and not _any(words, known.measured) and not _any(words, known.motor)
     odd = odd and index is None and not of_steps
     # of a path the last words count: pid.x.output, /joint_states/joint1/position
@@ -111,11 +112,6 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _any(words, known.encoder),
         steps,
     )
-
-
-def _counts_steps(text: str, steps: Collection[str]) -> bool:
-    """True for a unit of steps: [1/16 step], (usteps)."""
-    return any(word in steps or f"{word}s" in steps for word in plain_words(text))
 
 
 def _unit_of_object(name: str) -> str | None:

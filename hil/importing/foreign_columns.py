@@ -58,8 +58,8 @@ def format_of(path: Path) -> str:
         ending = ".txt"
     if ending not in _ENDINGS:
         raise InputError(
-            f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)}; "
-            "export the recording to one of them"
+            f"{path}: the ending {path.suffix!r} cannot be imported, allowed {', '.join(_ENDINGS)} or text with any "
+            "ending; export the recording to one of them"
         )
     if ending in RECORD_ENDINGS or (ending in TEXT_ENDINGS and long_form(path)):
         return ".json"

@@ -19,6 +19,7 @@ from hil.importing.foreign_columns import as_measured, check_foreign, format_of,
 from hil.importing.header_rows import read_factor
 from hil.importing.header_values import HeaderValue, header_text
 from hil.importing.lexicon import Constant
+from hil.importing.listed_scales import listed_scales
 from hil.importing.map_file import SECONDS, CsvOptions
 from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
@@ -110,6 +111,10 @@ def _text(path: Path) -> ForeignTable:
     titles = {name: header.titles.get(name, name) for name in names}
     told = described(dialect.above, list(titles.values()))
     of_lines = {title: unit for title, (_, unit) in told.items()} | told_units(dialect.above, list(titles.values()))
+    listed = listed_scales(dialect.above, list(told))
+    of_list = {name: listed.scales[title] for name, title in titles.items() if title in listed.scales}
+    header.row_scales = of_list | header.row_scales
+    header.notes += listed.notes
     applied = [name for name, scale in header.row_scales.items() if not _is_raw(read[name], *scale)]
     header.scales |= {name: scale for name, scale in header.row_scales.items() if name not in applied}
     header.notes += [

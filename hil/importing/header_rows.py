@@ -136,8 +136,8 @@ def _below_padded(rows: list[HeaderRow]) -> list[HeaderRow]:
 def _without_list(rows: list[HeaderRow]) -> list[HeaderRow]:
     """Rows without those that each describe a column by its name in another row: CH1;Pos;mm over #;CH1;CH2."""
     for row in rows:
-        described = {one.line: one.first for one in rows if one is not row and one.first in row.fields}
-        if len(set(described.values())) > 1:
+        described = {one.line: one.first for one in rows if one is not row and row.fields.count(one.first) == 1}
+        if len(described) > 1 and len(set(described.values())) == len(described):
             return [one for one in rows if one.line not in described]
     return rows
 

@@ -132,6 +132,7 @@ class Lexicon(_Entry):
     motor: Words
     table: Words
     steps: Words
+    step_units: Words
     encoder: Words
     part: Words
     attached_after: Words

@@ -2,10 +2,10 @@
 
 import re
 from collections.abc import Sequence
-from functools import cache
 
 from hil.importing.column_names import label
 from hil.importing.lexicon import Quantity, RowKind, lexicon
+from hil.importing.listed_scales import fields_of, rest_of_channel, scale_field
 from hil.importing.units import QUANTITY_OF_UNIT, factor_and_unit, unit_named
 
 _COMMENT = re.compile(r"^[\s\"#%/;!]+")
@@ -71,26 +71,30 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
     last = re.search(rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+[\[({{]?([^\s;,|\])}}]+)[\])}}]?\s*$", line)
     if last and unit_named(last[1]) and last[1] not in names:  # else it is a header, of t, n and m
         return "", last[1]
-    match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
-    if match is None:
+    rest = rest_of_channel(line, name)
+    if rest is None:
         return None
-    separator = r"[;\t|]" if re.search(r"[;\t|]", match[1]) else ","  # a comma may be the decimal mark
-    fields = [field.strip(' "') for field in re.split(separator, match[1])]
-    bracket = _BRACKET.search(match[1])
+    bracket = _BRACKET.search(rest)
     if bracket and (unit_named(bracket[1]) or factor_and_unit(bracket[1])):
-        return match[1][: bracket.start()].strip(), bracket[1]
-    units = [place for place, field in enumerate(fields) if place and unit_named(field)]
+        return rest[: bracket.start()].strip(), bracket[1]
+    fields = fields_of(rest)
+    units = {place: unit for place, field in enumerate(fields) if place and (unit := _unit_of_field(field))}
     if not units:
         return None
-    scales = [scale["factor"] for field in fields if (scale := re.fullmatch(_scale(), field))]
-    words = next((one for one in fields[: units[-1]] if label(one).sure), fields[0])
-    return words, " ".join((*scales[:1], fields[units[-1]]))
+    plain = [place for place, unit in units.items() if unit_named(unit)]
+    place = max(plain or units)
+    return next((one for one in fields[:place] if label(one).sure), fields[0]), units[place]
 
 
-@cache
-def _scale() -> re.Pattern[str]:
-    """A field that tells the factor of a column: scale 0.001, factor=0.1."""
-    return re.compile(rf"(?:{lexicon().rows[RowKind.SCALE]})\W*(?P<factor>\d+(?:[.,]\d+)?)", re.IGNORECASE)
+def _unit_of_field(field: str) -> str:
+    """Unit that is a field, perhaps with a factor below 1 (more is a range), or stands behind one; "" without it.
+
+    0.1 rpm, LSB=0.01 mm
+    """
+    told = scale_field(field)
+    unit = told.unit if told else field
+    part = factor_and_unit(unit)
+    return unit if unit_named(unit) or (part and part[0] < 1.0) else ""
 
 
 def _words_and_unit(text: str) -> tuple[str, str]:

@@ -81,6 +81,12 @@ def factor_and_unit(text: str) -> tuple[float, str] | None:
     return (value if match["value"] else 1.0 / value), match["unit"]
 
 
+def counts_steps(text: str) -> bool:
+    """True for a unit of a stepper's steps, or a part of one: [1/16 step], (µsteps), [Schritt]; not for [steps/s]."""
+    word = re.sub(r"^(1\s*/\s*\d+|half|full|\W)*", "", plain_spelling(text.strip(" []()<>{}")))
+    return word.replace("µ", "u") in lexicon().step_units
+
+
 def split_unit(name: str) -> tuple[str, str | None, bool]:
     """Name without its unit, the unit if it has one, and True if a unit stands there that is not known."""
     for bracket in reversed(list(_ANY_BRACKETS.finditer(name))):  # Current [A] (Axis 1)

@@ -155,7 +155,7 @@ class Mechanism:
     variants: tuple[Variant, ...]
     text: Text
     search: SearchHints = SearchHints()
-    valid: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # (values, variant, axis): can be there
+    can_be: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # values, variant, axis
     # (values, axis) -> the law is another mechanism's there, a more frequent cause: its equal, and no name
     is_another: Callable[[Sequence[float], AxisFacts], bool] | None = None
     # (values, axis) -> id and values of the mechanism that it is where it is no name; without: none
@@ -234,7 +234,7 @@ class Mechanism:
         """The part of the axis that a variant points at."""
         return self.variants[variant].element or self.element
 
-    def is_valid(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    def is_claimable(self, values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
         """Check that the effect is possible, and that its name applies."""
         return self.is_possible(values, variant, axis) and not (self.is_another and self.is_another(values, axis))
 
@@ -246,7 +246,7 @@ class Mechanism:
             return False
         if not axis.turn_known and self.once_per_turn:
             return False
-        return self.valid is None or self.valid(values, variant, axis)
+        return self.can_be is None or self.can_be(values, variant, axis)
 
     def wavelength_m(self, values: Sequence[float], axis: AxisFacts) -> float:
         """Length along the travel in which the effect repeats [m]; 0 if it is not periodic in position or angle.

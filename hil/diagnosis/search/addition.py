@@ -110,8 +110,8 @@ class Addition:
         return harm(self.fit, self.base, self.given)
 
     @cached_property
-    def valid(self) -> bool:
-        """True if the term has values of its mechanism that the sensors can show."""
+    def claimable(self) -> bool:
+        """True if the term can be there, and the name of its mechanism applies."""
         return claimable(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
 
     @cached_property
@@ -132,13 +132,13 @@ class Addition:
     @property
     def stands(self) -> bool:
         """True if the term has evidence, is material, and can be named as the cause."""
-        return self.valid and accepted(self.conditions)
+        return self.claimable and accepted(self.conditions)
 
     @property
     def considered(self) -> Considered:
         """The candidate and its ledger; channels are in it where the choice has asked for them."""
         more = (*self.conditions, *self.__dict__.get("harmless", ())) if self.possible else ()
-        return Considered.of(self.fit.terms, (*examine(VALUES, self.valid, CRITERIA), *more))
+        return Considered.of(self.fit.terms, (*examine(VALUES, self.claimable, CRITERIA), *more))
 
 
 def removed(without: Fit, fit: Fit, reference: Fit) -> float:

@@ -156,19 +156,24 @@ def lines_hz(run: Measured, d: Disturbance, most: int = 4) -> list[float]:
 
 
 def force_windows(run: Measured, d: Disturbance, most: int = 3) -> list[tuple[float, float, float]]:
-    """Start, end [s] and level [motor units] of the most significant constant disturbances, best first, none within
-    another; at least one."""
+    """Start, end [s] and level [motor units] of the most significant constant disturbances, best first; they are apart.
+
+    At least one.
+    """
     block = max(int(0.02 / run.period_s), 1)
     n = run.motor.size // block
     mask = d.sliding[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
     counts, scale, found = mask.sum(axis=1, dtype=np.float64), block * run.period_s, list[tuple[float, float, float]]()
+    taken = np.zeros(n, dtype=bool)
     while len(found) < most:
-        best = max(_levels(values, counts), key=lambda one: one.score)
-        if found and not best.score > 0.0:
+        apart = [one for one in _levels(values, counts) if not taken[one.first : one.last].any()]
+        best = max(apart, key=lambda one: one.score, default=None)
+        if best is None or (found and not best.score > 0.0):
             break
         found.append((best.first * scale, best.last * scale, best.level))
         values[best.first : best.last] = counts[best.first : best.last] = 0.0
+        taken[best.first : best.last] = True
     return found
 
 

@@ -228,9 +228,9 @@ def block_observed(effect: str, runs: Sequence[Measured]) -> bool:
 
 
 def claimable(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
-    """True if the values are valid for the mechanism of a term, and the sensors can show it."""
-    valid = BY_ID[term.effect].is_valid
-    return block_observed(term.effect, runs) and valid(term.values, term.variant, axis_facts(bench, runs))
+    """True if a term can be there, and the name of its mechanism applies at its values."""
+    named = BY_ID[term.effect].is_claimable
+    return block_observed(term.effect, runs) and named(term.values, term.variant, axis_facts(bench, runs))
 
 
 def possible(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:

@@ -90,11 +90,11 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
         fit = replace(fit.estimator, edge_step_s=LAST_EDGE_STEP_S).fit(fit.hypothesis)
     started = best if fit is best.fit else search.addition(fit)
     converged = _ended(started, search)
-    best = converged if converged.valid else started
+    best = converged if converged.claimable else started
     others = [_ended(one, search) if one.fit.cost < _NEAR * best.fit.cost else one for one in begun]
     order = ordered([best, *(one for one in others if one.possible)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
-    standing = [one for one in order if one is not best and one.valid and not objection(one, best)]
+    standing = [one for one in order if one is not best and one.claimable and not objection(one, best)]
     named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
@@ -184,6 +184,8 @@ def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> Riva
 
 def _behind(one: Addition, named: Addition) -> str:
     """Reason why an explanation with better evidence and no objection is not the named one."""
+    if not one.claimable:
+        return "a more frequent mechanism has the same law at these values"
     if _parts(one) > _parts(named):
         return "it acts on more parts of the axis"
     if one.fit.hypothesis.free > named.fit.hypothesis.free:

@@ -124,13 +124,13 @@ def screen_library(base: Fit) -> list[Candidate]:
     # a tuned start replaces the grid of its mechanism
     tuned = {effect: _tuned(base, same[0], views) for effect, same in best.items()}
     best = {effect: same if tuned[effect] is same[0] else [tuned[effect]] for effect, same in best.items()}
-    valid = partial(claimable, bench=base.bench, runs=base.data.runs)
+    named = partial(claimable, bench=base.bench, runs=base.data.runs)
 
     def gathered(effect: str, same: Sequence[Candidate]) -> Candidate | None:
         slot, scaled = free_slot(effect, terms), BY_ID[effect].search.proportional
-        same = [one for one in same if valid(one.term) or not scaled]  # an invalid start hides no other
+        same = [one for one in same if named(one.term) or not scaled]  # an invalid start hides no other
         every = [term for one in same[:1] for term in (one.term, *one.others)] + [one.term for one in same[1:_OTHERS]]
-        begun = [replace(term, slot=slot) for term in every if scaled or valid(term)]
+        begun = [replace(term, slot=slot) for term in every if scaled or named(term)]
         if not begun:
             return None
         return Candidate(begun[0], same[0].score, tuple(begun[1:]), by_channel=_most(one.by_channel for one in same))

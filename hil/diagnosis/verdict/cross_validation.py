@@ -131,7 +131,7 @@ def _instead(fit: Fit, dropped: Term, rival: Term, without: Fit) -> Fit | None:
     if term.key not in {one.key for one in found.terms}:
         return None
     addition = Addition(found, without, without, without)
-    return found if addition.valid and accepted(examine(NEEDED, addition, CRITERIA)) else None
+    return found if addition.claimable and accepted(examine(NEEDED, addition, CRITERIA)) else None
 
 
 def by_channel(fit: Fit, least: float = 1.0) -> dict[str, float]:

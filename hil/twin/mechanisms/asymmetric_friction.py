@@ -57,6 +57,6 @@ MECHANISM = Mechanism(
         reversed="Friction in positive direction is {offset_torque_n_m} below the mean of both directions.",
     ),
     search=SearchHints(typical=lambda a: (0.1 * a.friction,)),
-    valid=_valid,
+    can_be=_valid,
     same_torque=lambda variant: "" if variant else constant_load.MECHANISM.id,
 )

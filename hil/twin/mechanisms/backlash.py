@@ -58,6 +58,6 @@ MECHANISM = Mechanism(
         needs_table=True,
         beside=table_side_friction.MECHANISM.id,
     ),
-    valid=_valid,
+    can_be=_valid,
     softens=True,
 )

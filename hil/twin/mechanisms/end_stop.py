@@ -74,6 +74,6 @@ MECHANISM = Mechanism(
         Picture.FORCE_OVER_TRAVEL,
     ),
     search=SearchHints(typical=lambda a: (100.0 * a.friction / a.ratio, 0.1)),
-    valid=_is_at_an_end,
+    can_be=_is_at_an_end,
     most=2,  # one at each end
 )

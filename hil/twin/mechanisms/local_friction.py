@@ -65,5 +65,5 @@ MECHANISM = Mechanism(
         "{flank_m} at either end.",
     ),
     search=SearchHints(_starts, lambda a: (0.5, 0.1, 0.15, 0.01)),
-    valid=_is_zone,
+    can_be=_is_zone,
 )

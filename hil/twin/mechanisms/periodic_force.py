@@ -54,5 +54,5 @@ MECHANISM = Mechanism(
         lambda s: [(0.1 * s.coulomb / s.ratio, frequency_hz, 0.0) for frequency_hz in s.lines_hz],
         lambda a: (0.2 * a.friction / a.ratio, 7.0, 0.0),
     ),
-    valid=_valid,
+    can_be=_valid,
 )

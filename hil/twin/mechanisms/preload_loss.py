@@ -53,6 +53,6 @@ MECHANISM = Mechanism(
         beside=table_side_friction.MECHANISM.id,
         restarts=lambda stretch_m: [(f * stretch_m, ratio) for f, ratio in ((1.0, 0.15), (1.0, 0.4), (0.5, 0.15))],
     ),
-    valid=_valid,
+    can_be=_valid,
     softens=True,
 )

@@ -61,6 +61,6 @@ MECHANISM = Mechanism(
         "The linear encoder errs by {amplitude_m} within each signal period of {period_m}.", Picture.SCALE_READING
     ),
     search=SearchHints(_starts, lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0), needs_table=True),
-    valid=_valid,
+    can_be=_valid,
     is_another=_of_the_screw,
 )

@@ -63,7 +63,7 @@ MECHANISM = Mechanism(
     variants=(Variant(Stage.TABLE_FORCE, _pull_to_rest),),
     text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.FORCE_OVER_TRAVEL),
     search=SearchHints(_starts, lambda a: (0.5 * a.friction / a.ratio, 0.0)),
-    valid=_valid,
+    can_be=_valid,
     is_another=_is_weight,
     beyond=_weight,
 )

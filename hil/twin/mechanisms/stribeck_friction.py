@@ -66,6 +66,6 @@ MECHANISM = Mechanism(
         lambda a: (1.5 * a.friction, 2e-3 / a.ratio),
         proportional=False,
     ),
-    valid=_valid,
+    can_be=_valid,
     neutral=lambda a: a.coulomb,
 )

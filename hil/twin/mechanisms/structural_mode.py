@@ -157,5 +157,5 @@ MECHANISM = Mechanism(
         proportional=False,
         needs_table=True,
     ),
-    valid=_valid,
+    can_be=_valid,
 )

@@ -47,5 +47,5 @@ MECHANISM = Mechanism(
         lambda a: (50e-6, 1800.0),
         needs_table=True,
     ),
-    valid=_valid,
+    can_be=_valid,
 )

@@ -45,5 +45,5 @@ MECHANISM = Mechanism(
     search=SearchHints(
         lambda s: [(f * s.coulomb,) for f in (0.03, 0.15)], lambda a: (0.05 * a.friction,), proportional=False
     ),
-    valid=_valid,
+    can_be=_valid,
 )

@@ -43,6 +43,6 @@ MECHANISM = Mechanism(
         lambda a: (2.5 * a.rated_torque,),
         proportional=False,
     ),
-    valid=_valid,
+    can_be=_valid,
     neutral=lambda a: math.inf,
 )

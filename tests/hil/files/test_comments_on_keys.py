@@ -20,3 +20,9 @@ def test_a_comment_on_a_key_that_the_file_lacks_adds_no_value(text: str, expecte
     changed = with_changes(text, [YamlChange(("axis", "damping_ratio"), None, "not told")])
     assert changed == expected
     assert yaml.safe_load(changed) == yaml.safe_load(text)
+
+
+def test_a_comment_on_a_key_in_a_mapping_that_the_file_lacks_tells_its_whole_path() -> None:
+    changed = with_changes(BLOCK, [YamlChange(("axis", "friction", "coulomb_n_m"), None, "not told")])
+    assert changed == BLOCK.replace("# owner\n", "# owner\n  # friction.coulomb_n_m: not told\n")
+    assert yaml.safe_load(changed) == yaml.safe_load(BLOCK)

@@ -13,6 +13,7 @@ from hil.drafting.first_look import first_look
 from hil.errors import InputError, PartOfAxis
 from hil.explanation import explain
 from hil.importing.by_map import import_recording
+from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
 from hil.importing.encoder_counts import counts_ratio
 from hil.importing.map_draft import MapDraft
@@ -106,6 +107,20 @@ def test_a_unit_of_steps_says_that_the_set_points_count_them(tmp_path: Path, uni
     per_count = float(str(command.entry["scale"])) * draft.lead_m / (2.0 * np.pi)  # rad of the motor as travel
     assert np.ptp(STEPS) * per_count == pytest.approx(5e-3 * turns, rel=1e-3)
     assert draft.asked == []
+
+
+@pytest.mark.parametrize("unit", ["[1/16 step]", "[µsteps]", "(half step)", "[Schritt]", "[pas]", "[passi]"])
+def test_units_of_steps_are_known(unit: str) -> None:
+    assert label(f"cmd {unit}").steps
+    assert label("cmd", unit).steps
+    assert not label(f"pos_act {unit}").steps  # measured
+
+
+@pytest.mark.parametrize(
+    "name", ["Step [#]", "Torque step [arb]", "resolution [deg/step]", "cmd [steps/s]", "step [x]"]
+)
+def test_other_units_beside_a_step_are_no_steps(name: str) -> None:
+    assert not label(name).steps
 
 
 def test_steps_beside_a_linear_scale_tell_all_but_the_lead(tmp_path: Path) -> None:

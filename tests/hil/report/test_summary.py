@@ -24,3 +24,19 @@ def test_a_complete_search_says_nothing_of_a_budget_and_names_an_equal_rival(
     told = capsys.readouterr().out
     assert "budget" not in told
     assert "backlash or preload loss" in told
+
+
+@pytest.mark.parametrize(
+    ("std", "told"),
+    [
+        (1e-6, True),
+        (2.5e-5, False),  # more than the size itself
+        (0.0, True),
+    ],
+)
+def test_a_size_within_its_error_is_not_told(std: float, told: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    finding = EXAMPLE["missing"][0] | {"parameters": {"gap_m": {"value": 2.4e-5, "std": std, "unit": "m"}}}
+    print_diagnosis(Result.model_validate(EXAMPLE | {"missing": (finding,)}))
+    out = capsys.readouterr().out
+    assert ("not told by itself" not in out) is told
+    assert ("24.0 µm" in out or "24 µm" in out) is told

@@ -222,8 +222,10 @@ def test_no_name_applies_to_a_strength_at_the_bound_without_effect(mechanism: Me
     typical = list(mechanism.complete(mechanism.typical_values(axis)))
     for index in mechanism.indices(Role.STRENGTH):
         typical[index] = max(mechanism.parameters[index].low, 0.0) + 2e-20
-    assert not mechanism.is_valid(typical, 0, axis)
-    assert any(mechanism.is_valid(mechanism.typical_values(axis), form, axis) for form in range(len(mechanism.forms)))
+    assert not mechanism.is_claimable(typical, 0, axis)
+    assert any(
+        mechanism.is_claimable(mechanism.typical_values(axis), form, axis) for form in range(len(mechanism.forms))
+    )
 
 
 def test_an_offset_is_what_adds_one_torque_at_each_time_place_and_speed() -> None:

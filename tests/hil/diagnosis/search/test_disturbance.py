@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -53,6 +54,16 @@ def test_each_of_several_windows_of_a_force_is_where_a_search_may_begin() -> Non
         assert level == pytest.approx(-0.3, abs=0.1)
     still = Disturbance(torque, np.zeros(time_s.size), np.zeros(time_s.size, dtype=bool))
     assert len(force_windows(run, still)) == 1
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_windows_of_a_force_are_apart(seed: int) -> None:
+    run = take(concealed_run(OWNER, {}), OWNER)
+    random = np.random.default_rng(seed)
+    torque = np.cumsum(random.normal(0.0, 0.02, run.motor.size))
+    sliding = random.uniform(size=torque.size) < 0.9
+    found = sorted(force_windows(run, Disturbance(torque, np.ones(torque.size), sliding)))
+    assert all(end_s <= start_s for (_, end_s, _), (start_s, _, _) in pairwise(found))
 
 
 def test_lines_are_those_of_the_disturbance_over_time() -> None:

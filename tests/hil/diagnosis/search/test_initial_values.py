@@ -123,8 +123,8 @@ def test_values_that_belong_to_another_cause_have_no_name(train: Dataset, term: 
 def test_once_per_revolution_is_not_told_by_part_of_one() -> None:
     facts = axis_facts(load_bench("rotary").sampled(1e-3))
     mechanism = BY_ID["encoder_eccentricity"]
-    assert mechanism.is_valid((1e-3, 0.0), 0, replace(facts, travel_m=7.0))
-    assert not mechanism.is_valid((1e-3, 0.0), 0, replace(facts, travel_m=6.0))  # less than 2 pi
+    assert mechanism.is_claimable((1e-3, 0.0), 0, replace(facts, travel_m=7.0))
+    assert not mechanism.is_claimable((1e-3, 0.0), 0, replace(facts, travel_m=6.0))  # less than 2 pi
 
 
 def test_a_dead_zone_lets_the_drive_move_the_axis(train: Dataset) -> None:
@@ -191,7 +191,7 @@ def test_a_stop_is_reached_and_leaves_most_of_the_travel_free() -> None:
         (-0.01, LOWER, False),
         (0.37, LOWER, False),
     ):
-        assert BY_ID["end_stop"].is_valid((1e5, edge_m), variant, facts) is told
+        assert BY_ID["end_stop"].is_claimable((1e5, edge_m), variant, facts) is told
 
 
 def test_a_zone_is_a_part_of_the_travel() -> None:
@@ -203,13 +203,13 @@ def test_a_zone_is_a_part_of_the_travel() -> None:
         ((0.30, 0.22, 0.004), False),
         ((0.22, 0.30, 0.1), False),  # flanks without a zone between
     ):
-        assert BY_ID["local_friction"].is_valid((0.5, *zone), 0, facts) is told
+        assert BY_ID["local_friction"].is_claimable((0.5, *zone), 0, facts) is told
 
 
 def test_a_few_waves_in_the_whole_recording_are_a_drift() -> None:
     facts = axis_facts(OWNER, [take(concealed_run(OWNER, {}), OWNER)])
     for waves, told in ((8.0, True), (3.0, False)):
-        assert BY_ID["periodic_force"].is_valid((10.0, waves / facts.duration_s, 0.0), 0, facts) is told
+        assert BY_ID["periodic_force"].is_claimable((10.0, waves / facts.duration_s, 0.0), 0, facts) is told
 
 
 def test_it_is_offered_only_for_an_encoder_on_a_load_that_turns() -> None:
@@ -221,4 +221,4 @@ def test_it_is_offered_only_for_an_encoder_on_a_load_that_turns() -> None:
     assert mechanism.turning  # not on an axis whose load moves along a line
     facts = axis_facts(geared().sampled(1e-3))
     for travel_m, told in ((7.0, True), (6.0, False)):
-        assert mechanism.is_valid((1e-3, 0.0), 0, replace(facts, travel_m=travel_m)) is told
+        assert mechanism.is_claimable((1e-3, 0.0), 0, replace(facts, travel_m=travel_m)) is told

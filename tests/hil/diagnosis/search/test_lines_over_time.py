@@ -35,4 +35,4 @@ def test_time_stamps_that_are_late_now_and_then_are_no_force(tmp_path: Path, lat
     prepared = prepare([read_recording(tmp_path / "log.parquet")], [], bench)
     facts = axis_facts(prepared.bench, prepared.train.runs)
     assert facts.grows_with_speed(LINE_HZ) is bool(late_s)
-    assert BY_ID["periodic_force"].is_valid((0.1, LINE_HZ, 0.0), 0, facts) is not bool(late_s)
+    assert BY_ID["periodic_force"].is_claimable((0.1, LINE_HZ, 0.0), 0, facts) is not bool(late_s)

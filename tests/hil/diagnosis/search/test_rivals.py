@@ -84,7 +84,7 @@ def test_a_little_harm_does_not_set_aside_what_explains_nearly_all(monkeypatch: 
         "unrepeated": (0.0, 0.0),
         "inside": None,
         "torque": None,
-        "valid": True,
+        "claimable": True,
     }.items():
         monkeypatch.setattr(Addition, name, value)
     search = SearchRound(base := explained(5e5, 12.0, 1000.0), base, explained(6e5, 16.0, 1100.0))

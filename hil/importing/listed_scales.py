@@ -1,0 +1,88 @@
+"""Factors and offsets of channels in lines above the numbers, a line for each: CH1;Position;mm;scale 0.001."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+from hil.importing.lexicon import RowKind, lexicon
+
+_BETWEEN = re.compile(r"[;\t|]|,(?!\d)|(?<!\d),")  # a comma between two digits is the decimal mark
+_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
+_VALUE = re.compile(
+    rf"(?:1\s*[/:]\s*(?P<part>[1-9]\d*)|(?P<number>{_NUMBER}))\s*(?P<unit>[^\d\s/:]\D*2?)?", re.IGNORECASE
+)
+_FRACTION = re.compile(rf"(?!\d+$){_NUMBER}", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class ScaleField:
+    """A field that tells a factor or an offset (`kind`): LSB=0.01 mm. `value` is None where it is not read."""
+
+    kind: RowKind
+    value: float | None
+    unit: str = ""
+
+
+@dataclass
+class ListedScales:
+    """Factor and offset by name of a channel, and notes on fields that look like one and are not read."""
+
+    scales: dict[str, tuple[float, float]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def rest_of_channel(line: str, name: str) -> str | None:
+    """Text of a line behind the `name` of a channel with which it begins; None if it begins otherwise."""
+    match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
+    return match[1] if match else None
+
+
+def fields_of(text: str) -> list[str]:
+    """Fields between semicolons, bars, tabs or commas that are no decimal mark."""
+    return [one.strip(' "') for one in _BETWEEN.split(text)]
+
+
+def scale_field(text: str) -> ScaleField | None:
+    """Read a field: scale 0.001, factor=-1e-3, x0.1, Faktor 1/1000, offset 2; None for one that tells neither."""
+    match = _word().match(text)
+    if match is None or not re.search(r"\d", text):
+        return None
+    kind = RowKind.OFFSET if match["offset"] else RowKind.SCALE
+    told = _VALUE.fullmatch(text[match.end() :].rstrip(" )"))
+    if told is None:
+        return ScaleField(kind, None)
+    value = 1.0 / float(told["part"]) if told["part"] else float(told["number"].replace(",", "."))
+    return ScaleField(kind, value if value or kind is RowKind.OFFSET else None, told["unit"] or "")
+
+
+def listed_scales(lines: Sequence[str], names: Sequence[str]) -> ListedScales:
+    """Scales of the channels `names` by the lines that begin with them; a factor of 0 is not read."""
+    found = ListedScales()
+    for name in names:
+        rest = next((rest for line in lines if (rest := rest_of_channel(line, name))), "")
+        factor, offset = 1.0, 0.0
+        for text in fields_of(rest)[1:]:
+            told = scale_field(text)
+            if told is None and not _FRACTION.fullmatch(text):
+                continue
+            if told is None or told.value is None:
+                found.notes.append(
+                    f"header: {text!r} of {name} is not read; give it as scale or offset of this channel in the map if "
+                    "it is one"
+                )
+            elif told.kind is RowKind.SCALE:
+                factor = told.value
+            else:
+                offset = told.value
+        if (factor, offset) != (1.0, 0.0):
+            found.scales[name] = factor, offset
+    return found
+
+
+@cache
+def _word() -> re.Pattern[str]:
+    """Beginning of a field that tells a factor or an offset, up to its number."""
+    rows = lexicon().rows
+    words = rf"(?:(?P<offset>{rows[RowKind.OFFSET]})|{rows[RowKind.SCALE]})\b[\s:=(]*[x×*]?"
+    return re.compile(rf"\s*(?:{words}|[x×*](?=\s*[-+.,\d]))\s*", re.IGNORECASE)

@@ -64,7 +64,7 @@ class Scene:
     ratio: float  # [m/rad]
     lead_m: float  # of the screw
     orders: list[float]  # of the disturbance torque, per revolution
-    ripple_orders: list[float]  # of the disturbance torque over the torque
+    ripple_orders: list[float]  # of a disturbance that grows with the torque
     friction_periods: list[float]  # [m]
     friction_zones: list[tuple[float, float, float]]  # from, to [m], friction above the rest of the travel [N m]
     scale_periods: list[float]  # of the table residual [m]

@@ -6,7 +6,7 @@ with the motor's innovation e (see `hil.identification.hypothesis`), the inertia
 constant tau of the observer: the torque whose effect equals the observer's correction of the motor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.identification.least_squares import least_squares
 from hil.identification.measured import Measured
-from hil.identification.periods import harmonic_share, strongest_periods
+from hil.identification.periods import strongest_periods
+from hil.identification.whitening import RANK, filtered, whitening_filter
 
 _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
 _FINE_M, _COARSEST_M = 1e-3, 1e-2  # signal periods of scales: optical and magnetic ones below, inductive ones above
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
 _BINS = 400  # of the travel, for zones of friction
 _ORDERS = np.arange(1, 161)  # of the motor angle: slots, pole passings, and their common multiples
+_FEWEST_ROWS, _MOST_ROWS = 100, 20_000  # for orders
 _SLOWER, _REPEATS = 1.1, 4.0  # turns of the motor beyond its own, and periods over the travel, of what turns slower
 
 
@@ -69,29 +71,48 @@ def orders(
     disturbances: Sequence[Disturbance],
     angle_per_unit: float,
     most: int = 3,
-    weight: Sequence[FloatArray] | None = None,
+    weights: Sequence[FloatArray] | None = None,
 ) -> list[float]:
     """Orders per motor revolution with the strongest disturbance, best first, and always orders 1 and 2.
 
-    Only rows slow enough for the moving mean to pass the order are used; with few turns of them high orders overfit.
-    Less than a turn does not tell the best from its neighbours. Orders 1 and 2 are typical of an unbalanced or bent
-    screw.
+    Beside friction and inertia, both sides whitened: a slow error has its share at many orders and would hide a ripple.
+    `weights` (n,) of each run multiply the ripple, as the torque does. Less than a turn does not tell the best from its
+    neighbours. Orders 1 and 2 are typical of an unbalanced or bent screw.
     """
-    shares = []
-    for order in _ORDERS:
-        phases, signals = [], []
-        for index, (run, d) in enumerate(zip(runs, disturbances, strict=True)):
-            rate = np.abs(d.velocity) * angle_per_unit * order / (2.0 * np.pi)
-            rows = d.sliding & (rate < _PASS_HZ) & (rate > 0.5)
-            phases.append(order * angle_per_unit * run.motor[rows])
-            signals.append((d.torque if weight is None else weight[index])[rows])
-        phase, signal = np.concatenate(phases), np.concatenate(signals)
-        step = max(phase.size // 10000, 1)
-        phase, signal = phase[::step], signal[::step]
-        shares.append(harmonic_share(phase, signal) * min(1.0, phase.size / 1000.0) if phase.size > 100 else 0.0)
-    best = [float(_ORDERS[index]) for index in np.argsort(shares)[::-1][:most]]
-    beside = [order for order in (best[0] - 1.0, best[0] + 1.0) if order >= 1.0]
-    return list(dict.fromkeys((*best, *beside, 1.0, 2.0)))
+    rows = sum(run.motor.size for run in runs)
+    every = [slice(None, None, max(_width(run.period_s) // 2, -(-rows // _MOST_ROWS))) for run in runs]
+    of = list(zip(runs, disturbances, weights or [np.ones(run.motor.size) for run in runs], every, strict=True))
+    at = [d.sliding[step] for _, d, _, step in of]
+    if sum(int(one.sum()) for one in at) < _FEWEST_ROWS:
+        return [1.0, 2.0]
+
+    def on_rows(values: Iterable[FloatArray]) -> FloatArray:
+        return np.concatenate([one[step][row] for one, step, row in zip(values, every, at, strict=True)])
+
+    torque, velocity = on_rows(d.torque for d in disturbances), on_rows(d.velocity for d in disturbances)
+    change = on_rows(np.gradient(d.velocity) for d in disturbances)
+    angle, weight = on_rows(run.motor for run in runs) * angle_per_unit, on_rows(one for _, _, one, _ in of)
+    beside = np.column_stack([np.ones_like(torque), np.sign(velocity), velocity, change])
+    taps = whitening_filter(torque, beside, at)
+    basis, _ = np.linalg.qr(np.column_stack([filtered(column, at, taps) for column in beside.T]))
+
+    def apart(column: FloatArray) -> FloatArray:
+        white = filtered(column, at, taps)
+        return white - basis @ (basis.T @ white)
+
+    left = apart(torque)
+    energies = [
+        _explained(left, [apart(weight * wave(order * angle)) for wave in (np.cos, np.sin)]) for order in _ORDERS
+    ]
+    best = [float(_ORDERS[index]) for index in np.argsort(energies)[::-1][:most]]
+    beside_best = [order for order in (best[0] - 1.0, best[0] + 1.0) if order >= 1.0]
+    return list(dict.fromkeys((*best, *beside_best, 1.0, 2.0)))
+
+
+def _explained(signal: FloatArray, columns: Sequence[FloatArray]) -> float:
+    """Energy of a signal (n,) that columns (n,) explain by least squares."""
+    matrix = np.column_stack(columns)
+    return float(signal @ matrix @ np.linalg.lstsq(matrix, signal, rcond=RANK)[0])
 
 
 def other_orders(runs: Sequence[Measured], disturbances: Sequence[Disturbance], angle_per_unit: float) -> list[float]:

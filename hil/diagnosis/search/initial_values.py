@@ -76,10 +76,6 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
     per_lead = [lead / period for period in periods if period < lead]
     whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE and physics.turn_known]
     orders = list(dict.fromkeys((*orders, *whole)))
-    ripple = [
-        d.torque / np.where(np.abs(run.torque) > 0.2 * physics.coulomb_n_m, run.torque, np.inf)
-        for run, d in zip(runs, disturbances, strict=True)
-    ]
     return Scene(
         coulomb=max(physics.coulomb_n_m, 1e-6),
         peak_torque=max(float(np.max(np.abs(run.torque))) for run in runs),
@@ -92,7 +88,7 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         ratio=ratio,
         lead_m=lead,
         orders=orders,
-        ripple_orders=estimate.orders(runs, disturbances, physics.angle_per_unit, 2, ripple)
+        ripple_orders=estimate.orders(runs, disturbances, physics.angle_per_unit, 2, [run.torque for run in runs])
         if physics.turn_known
         else [],
         friction_periods=[*periods, *turns],

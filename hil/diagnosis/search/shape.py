@@ -18,8 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 from scipy.special import betaln
 from scipy.stats import t as student
 
@@ -38,6 +36,7 @@ from hil.identification.plain_model import MOTION, PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries, autocovariance
 from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain, measured_motion
+from hil.identification.whitening import RANK, filtered, spread, whitening_filter
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.parameter import Role
@@ -46,11 +45,8 @@ from hil.twin.physics import Active
 _FEWEST_ROWS = 100
 _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
-_ORDER = 24  # of the autoregressive model: as that of `hil.identification.inference`
-_RIDGE = 1e-4  # of white noise in the autocovariance: a filter that takes off a hundredth of the rms is far enough
 _LARGEST = 1e150  # of a residual: an unstable twin leaves more, and its square overflows
 _UNDERFLOW = 1e-290  # probability below which its floating-point number loses digits
-_RANK = 1e-9  # share of a column, beside the others, below which it is not told
 
 
 def log_chance_below_noise(fit: Fit, without: Fit) -> float | None:
@@ -213,25 +209,25 @@ def _first_coefficient(
     tells it no better than one. Rows (m,) of each run count.
     """
     whole = np.column_stack([signal, matrix])
-    taps = _whitening(whole, rows)
-    signal, *columns = (np.concatenate(_filtered(one, rows, taps)) for one in whole.T)
+    taps = whitening_filter(signal, matrix, rows)
+    signal, *columns = (filtered(one, rows, taps) for one in whole.T)
     matrix = np.column_stack(columns)
     scale = np.linalg.norm(matrix, axis=0)
     scaled = matrix / np.where(scale > 0.0, scale, 1.0)
     basis, upper = np.linalg.qr(scaled)  # an orthonormal basis: the singular values are those of a small matrix
-    weights = np.linalg.pinv(upper, rcond=_RANK) @ basis.T
+    weights = np.linalg.pinv(upper, rcond=RANK) @ basis.T
     solved = weights @ signal
-    own = upper[:, 0] - upper[:, 1:] @ np.linalg.lstsq(upper[:, 1:], upper[:, 0], rcond=_RANK)[0]
-    if float(own @ own) < _RANK:  # the others make it
+    own = upper[:, 0] - upper[:, 1:] @ np.linalg.lstsq(upper[:, 1:], upper[:, 0], rcond=RANK)[0]
+    if float(own @ own) < RANK:  # the others make it
         return 0.0, 0.0, 0.0
     splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
     residual = np.split(signal - scaled @ solved, splits)
-    parts = [ResidualSeries(_spread(left, at), at) for left, at in zip(residual, rows, strict=True)]
+    parts = [ResidualSeries(spread(left, at), at) for left, at in zip(residual, rows, strict=True)]
     covariance = autocovariance(parts)
     variance = 0.0
     for weight, at in zip(np.split(weights[0], splits), rows, strict=True):
         size = 1 << (2 * at.size - 1).bit_length()
-        products = np.fft.irfft(np.abs(np.fft.rfft(_spread(weight, at), size)) ** 2, size)[: covariance.size]
+        products = np.fft.irfft(np.abs(np.fft.rfft(spread(weight, at), size)) ** 2, size)[: covariance.size]
         lags = covariance[: products.size]
         variance += float(lags[0] * products[0] + 2.0 * lags[1:] @ products[1 : lags.size])
     repeated = 1.0 + _repeated(parts, np.split(weights[0], splits), laps) / variance if variance > 0.0 else 1.0
@@ -250,41 +246,11 @@ def _repeated(parts: Sequence[ResidualSeries], weights: Sequence[FloatArray], la
         if of is None:
             continue
         both = part.rows[of.first] & part.rows[of.again]
-        first, again, series = of.first[both], of.again[both], _spread(weight, part.rows)
+        first, again, series = of.first[both], of.again[both], spread(weight, part.rows)
         if first.size:
             alike = max(float(np.mean(part.left[first] * part.left[again])), 0.0)
             found += 2.0 * alike * max(float(series[first] @ series[again]), 0.0)
     return found
-
-
-def _whitening(whole: FloatArray, rows: Sequence[NDArray[np.bool_]]) -> FloatArray:
-    """Prediction-error filter (k,) of what the further columns (n, p) of a matrix leave of its first."""
-    scaled = whole[:, 1:] / np.maximum(np.linalg.norm(whole[:, 1:], axis=0), 1e-300)
-    basis, upper = np.linalg.qr(scaled)
-    left = whole[:, 0] - scaled @ (np.linalg.pinv(upper, rcond=_RANK) @ (basis.T @ whole[:, 0]))
-    parts = np.split(left, np.cumsum([int(at.sum()) for at in rows])[:-1])
-    covariance = autocovariance([ResidualSeries(_spread(one, at), at) for one, at in zip(parts, rows, strict=True)])
-    order = min(_ORDER, covariance.size - 1)
-    if order < 1 or not covariance[0] > 0.0:
-        return np.ones(1)
-    covariance[0] *= 1.0 + _RIDGE
-    return np.concatenate([[1.0], -solve_toeplitz(covariance[:order], covariance[1 : order + 1])])
-
-
-def _filtered(values: FloatArray, rows: Sequence[NDArray[np.bool_]], taps: FloatArray) -> list[FloatArray]:
-    """Values (n,) of the rows that count, filtered run by run; between stretches of rows they go on evenly."""
-    found = []
-    for one, at in zip(np.split(values, np.cumsum([int(at.sum()) for at in rows])[:-1]), rows, strict=True):
-        even = np.interp(np.arange(at.size), np.flatnonzero(at), one) if one.size else np.zeros(at.size)
-        found.append(lfilter(taps, [1.0], even)[at])
-    return found
-
-
-def _spread(values: FloatArray, at: NDArray[np.bool_]) -> FloatArray:
-    """Values of the rows that count as a series (n,), 0 in the others."""
-    series = np.zeros(at.size)
-    series[at] = values
-    return series
 
 
 def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from hil.bench.axis_fields import BenchSection, NotNegative, Positive
 from hil.control.cascade import INFINITE, Gains, make_gains
 from hil.errors import FieldError
+from hil.quantities import digits
 
 _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
 UNKNOWN = "unknown"
@@ -122,6 +123,12 @@ class Control(BenchSection):
         return self.model_copy(update=changed)
 
 
+def delay_in_words(delay_s: float) -> str:
+    """A torque delay [s] as text: positive if the recorded torque acts later, negative if it has acted before."""
+    shown = f"{digits(1e3 * abs(delay_s))} ms"
+    return f"torque acts {shown} after its row" if delay_s >= 0.0 else f"torque is recorded {shown} after it acts"
+
+
 class UnknownControl(BenchSection):
     """A control law that is not known. It is not simulated, and no mismatch is assigned to it."""
 
@@ -131,7 +138,8 @@ class UnknownControl(BenchSection):
         None,
         ge=-MOST_TORQUE_DELAY_S,
         le=MOST_TORQUE_DELAY_S,
-        description="recorded torque acts so late; estimated from this value; absent: 0 [s]",
+        description="the recorded torque acts so much later, negative: has acted so much before; estimated from this "
+        "value; absent: 0 [s]",
     )
     position_feedback: Literal["motor", "table"] = Field("motor", description="encoder of the position loop")
     torque_limit_n_m: Positive | None = Field(None, description="limit of the torque command; absent: none")

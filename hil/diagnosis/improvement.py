@@ -45,9 +45,9 @@ def _below_the_noise(result: Result) -> str:
             )
     chances = [chance for one in result.findings if (chance := _chance(result, one.effect)) is not None]
     if chances:
-        what = "its shape" if len(result.findings) == 1 else "each shape"
+        what = "its effect is" if len(result.findings) == 1 else "each effect is"
         by = by_chance(max(chances))
-        told.append(f"{what} is clear from all rows together, though in one row it is below the noise ({by})")
+        told.append(f"{what} below the noise of one row, and clear from all rows together ({by})")
     text = "; ".join(told) or "without it every residual was within its noise, too"
     return f"{text[:1].upper()}{text[1:]}."
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from math import hypot, log2, pi, sqrt
 
-from hil.bench.control_section import MOST_TORQUE_DELAY_S
+from hil.bench.control_section import MOST_TORQUE_DELAY_S, delay_in_words
 from hil.channels import AxisKind
 from hil.drafting.bench_notes import bench_notes
 from hil.drafting.bench_value import BenchValue
@@ -108,13 +108,11 @@ def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None
     if plant.early_s is None or rows_are_ticks(recording):
         return None
     early = plant.early_s
-    way = f"{digits(1e3 * abs(early.value))} ms {'late' if early.value < 0.0 else 'early'}"
     delay_s = early.value - 0.5 * recording.period_s
     if abs(delay_s) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
         return None
-    return BenchValue(
-        "torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", f"the torque is recorded {way}, and held for a row"
-    )
+    how = f"{delay_in_words(delay_s)}; of it half a row, as each value is held for one"
+    return BenchValue("torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", how)
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
@@ -136,9 +134,10 @@ def _screw(draft: BenchDraft, plant: PlantValues, deflection: Estimate | None, l
     if deflection is None:
         draft.axis.append(_value("mass_kg", mass, "kg", inertia))
     else:
-        half = _guess(mass.scaled(0.5))
+        half, rotor = _guess(mass.scaled(0.5)), digits(1e-4 * (2.0 * pi / lead.value) ** 2)
+        split = f"half of {digits(mass.value)} kg: the split is not told; a rotor of 1e-4 kg m^2 counts {rotor} kg"
         draft.axis += [
-            _value("motor_mass_kg", half, "kg", f"half of {digits(mass.value)} kg: the split is not told"),
+            _value("motor_mass_kg", half, "kg", split),
             _value("table_mass_kg", half, "kg", f"the other half; {inertia}"),
             _value("stiffness_n_m", _stiffness(half, deflection), "N/m", "for this split"),
         ]

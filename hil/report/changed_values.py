@@ -3,7 +3,7 @@
 import math
 
 from hil.bench.bench_file import Bench
-from hil.bench.control_section import UNKNOWN, UnknownControl
+from hil.bench.control_section import UNKNOWN, UnknownControl, delay_in_words
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.value import Correction
 from hil.diagnosis.verdict.findings import not_split
@@ -68,5 +68,5 @@ def _change(path: FieldPath, before: object, after: object, told: Correction | N
     shown = f"{before:.6g}" if isinstance(before, float) else "0" if before is None else str(before)
     text = rounded_to_error(after, error)
     if path == ("control", DELAY):
-        return YamlChange(("control",), {"law": UNKNOWN, DELAY: text}, f"torque acts so late, {sure} {how}")
+        return YamlChange(("control",), {"law": UNKNOWN, DELAY: text}, f"{delay_in_words(after)}, {sure} {how}")
     return YamlChange(path, text if float(text) else repr(after), f"{sure} {how}; before {shown}".strip())

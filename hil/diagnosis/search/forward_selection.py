@@ -114,7 +114,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         if begins and base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
             begin = base if base.terms else less_torque(plain, given, base)
             quiet = noise_apart(base.data, begin.hypothesis, plain)
-            base, given = over(quiet, begin), over(quiet, given, 1)
+            base, given = over(quiet, begin), carried(quiet, given)
             nominal = over(quiet, nominal) if base.terms else base
         step(f"screening the library beside {len(base.terms)} terms")
         if stopped_at:
@@ -173,9 +173,14 @@ def less_torque(plain: PlainModel, *fits: Fit) -> Fit:
     return min(fits, key=left)
 
 
-def over(data: Dataset, fit: Fit, evaluations: int = ENDED) -> Fit:
+def over(data: Dataset, fit: Fit) -> Fit:
     """Fit the hypothesis of a fit to another data set."""
-    return replace(fit.estimator, data=data).fit(fit.hypothesis, evaluations=evaluations)
+    return replace(fit.estimator, data=data).fit(fit.hypothesis, evaluations=ENDED)
+
+
+def carried(data: Dataset, fit: Fit) -> Fit:
+    """A fit with its own values on another data set, with the residuals and the Jacobian there."""
+    return replace(replace(fit.estimator, data=data).fit(fit.hypothesis, evaluations=1), converged=fit.converged)
 
 
 def _without(fit: Fit, index: int) -> Fit:

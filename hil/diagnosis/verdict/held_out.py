@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.events import with_events_of
-from hil.diagnosis.search.forward_selection import over
+from hil.diagnosis.search.forward_selection import carried, over
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
@@ -36,7 +36,7 @@ def test_on_held_out(searched: Searched) -> Tested:
         reference = nominal if nominal.within_noise else final
         there = noise_apart(there, reference.hypothesis, plain)
     proof = cross_validate(over(data, nominal), final, there, rivals)
-    return _tested(searched, replace(proof, final=over(searched.prepared.train, proof.final, 1)))
+    return _tested(searched, replace(proof, final=carried(searched.prepared.train, proof.final)))
 
 
 def with_own_noise(fit: Fit, held_out: Dataset) -> Fit:

@@ -138,8 +138,8 @@ MECHANISM = Mechanism(
             _with_flexible_load,
             "flexible load",
             text=Text(
-                "The load is flexible: an inertia of {mass_ratio} of that of the rest of the axis swings against a "
-                "motor at rest with {frequency_hz} (antiresonance of the motor), damped by {damping_ratio}."
+                "The load is flexible: while the motor is held, an inertia of {mass_ratio} of that of the rest of the "
+                "axis swings at {frequency_hz}, damped by {damping_ratio}."
             ),
             element="load on an elastic arm, shaft or belt",
             # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia

@@ -35,12 +35,10 @@ def test_of_a_residual_below_its_noise_the_torque_is_told() -> None:
 
 def test_a_shape_below_the_noise_is_told_by_its_chance() -> None:
     told = improvement(result(3.32e-3, 3.30e-3, 9.14e-3, considered=(shape(1e-9),)))
-    assert (
-        told == "Its shape is clear from all rows together, though in one row it is below the noise (by chance 1e-09)."
-    )
+    assert told == "Its effect is below the noise of one row, and clear from all rows together (by chance 1e-09)."
     both = improvement(result(3.32e-3, 3.30e-3, 9.14e-3, torque_left=TORQUE, considered=(shape(1e-20),)))
     assert both.endswith(
-        "to 13.1 %; its shape is clear from all rows together, though in one row it is below the noise "
+        "to 13.1 %; its effect is below the noise of one row, and clear from all rows together "
         "(by chance less than 1e-12)."
     )
 

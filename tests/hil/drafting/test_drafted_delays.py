@@ -7,6 +7,7 @@ import pytest
 from foreign_axis import axis
 
 from hil.drafting.drafted_bench import DraftedBench, drafted
+from hil.quantities import digits
 from hil.recording.recording import Recording
 
 AXIS = axis(rows=8000)
@@ -27,7 +28,7 @@ def test_a_torque_that_is_recorded_late_is_in_the_bench(late_rows: int) -> None:
     begun_s = -0.5 * period_s if prompt.bench.torque_delay_s is None else prompt.bench.torque_delay_s
     assert late.bench.torque_delay_s == pytest.approx(begun_s - late_rows * period_s, abs=0.1 * period_s)
     assert late.bench.axis.inertia_kg_m2 == pytest.approx(prompt.bench.axis.inertia_kg_m2, rel=0.02)
-    assert "ms late, and held for a row" in late.text
+    assert f"torque is recorded {digits(-1e3 * late.bench.torque_delay_s)} ms after it acts" in late.text
 
 
 @pytest.mark.parametrize("late_rows", [-2, -1, 1, 2])

@@ -81,3 +81,15 @@ def test_a_term_that_is_removed_again_gives_its_place_to_the_next_that_stands(mo
     assert grown is not None
     assert [term.effect for term in grown.fit.terms] == ["torque_ripple"]
     assert list(grown.rivals) == list(grown.needed) == [second.fit.terms[-1].key]
+
+
+def test_a_fit_that_is_carried_to_other_recordings_keeps_its_values_and_how_it_ended() -> None:
+    first, second = ([take(recorded(OWNER, seed=seed), OWNER)] for seed in (1, 2))
+    fit = fitted(Hypothesis(OWNER), first)
+    other = fit.data.over(second)
+    assert fit.converged
+    there = forward_selection.carried(other, fit)
+    assert there.converged
+    assert there.data is other
+    assert there.hypothesis.x == pytest.approx(fit.hypothesis.x, rel=0.0)
+    assert there.jacobian.shape == (there.residuals.vector.size, fit.hypothesis.x.size)

@@ -48,6 +48,12 @@ class AxisFacts:
         """Coulomb friction, above zero [N m]."""
         return max(self.coulomb, 1e-6)
 
+    @property
+    def middle_m(self) -> float:
+        """Middle of the motion of the table [m]; 0 where it is not known."""
+        first_m, last_m = self.positions_m
+        return 0.5 * (first_m + last_m) if math.isfinite(last_m - first_m) else 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

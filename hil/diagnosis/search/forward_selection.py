@@ -192,7 +192,8 @@ def _without(fit: Fit, index: int) -> Fit:
 def claimed(fit: Fit) -> Fit:
     """Remove the terms whose values are not valid for their mechanism; where these are another's, that takes its place.
 
-    A spring that rests out of reach is a weight, and so is one whose stiffness does not differ from none.
+    A spring that rests out of reach is a weight. So is one whose stiffness does not differ from none, and gravity over
+    so short an arc that its size does not.
     """
     while True:
         lost = _invalid(fit)

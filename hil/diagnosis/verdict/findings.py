@@ -67,7 +67,8 @@ def findings(
         if index in forms:
             continue
         errors = deviations[final.hypothesis.columns(index)]
-        rivals = rivals_of(searched, term)
+        beside = {one.effect for one in terms if one is not term and BY_ID[one.effect].most == 1}
+        rivals = [one for one in rivals_of(searched, term) if one.terms[-1].effect not in beside]  # those are no equals
         tied = [rival.terms[-1].effect for rival in rivals if rival.tied]
         others = [name for name in same_torque(term) if name != term.effect]
         tied += [name for name in others if claimable(replace(term, effect=name), bench, runs)]

@@ -4,17 +4,25 @@ The load's angle is 0 where the recording has its zero; `angle_rad` is that angl
 """
 
 import math
+from collections.abc import Sequence
 
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanisms.constant_load import MECHANISM as LOAD
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
+from hil.twin.scene import AxisFacts
 
 
 @njit
 def _pull_down(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     return value - parameters[0] * math.sin(at.table_position_m + parameters[1])
+
+
+def _load(values: Sequence[float], axis: AxisFacts) -> tuple[str, tuple[float, ...]]:
+    """The constant load with the torque of gravity in the middle of the arc: all that a short one tells."""
+    return LOAD.id, (values[0] * math.sin(axis.middle_m + values[1]) * axis.ratio,)
 
 
 MECHANISM = Mechanism(
@@ -31,5 +39,6 @@ MECHANISM = Mechanism(
     text=Text("Gravity turns the load with up to {gravity_torque_n_m}.", Picture.FORCE_OVER_TRAVEL),
     search=SearchHints(lambda s: [(0.1 * s.coulomb / s.ratio, 0.0)], lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     told_by_m=lambda values, a: 0.0,
+    beyond=_load,
     turning=True,
 )

@@ -1,7 +1,6 @@
 """Spring load: a force on the table proportional to its position."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 from numba import njit
 
@@ -46,8 +45,7 @@ def _is_weight(values: Sequence[float], axis: AxisFacts) -> bool:
 
 def _weight(values: Sequence[float], axis: AxisFacts) -> tuple[str, tuple[float, ...]]:
     """The constant load with the force of the spring in the middle of the travel."""
-    middle_m = 0.5 * sum(axis.positions_m) if all(map(isfinite, axis.positions_m)) else 0.0
-    return LOAD.id, (values[0] * (middle_m - values[1]) * axis.ratio,)
+    return LOAD.id, (values[0] * (axis.middle_m - values[1]) * axis.ratio,)
 
 
 MECHANISM = Mechanism(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from diagnosis_runs import bench, fitted, recorded
+from diagnosis_runs import bench, fitted, moves, recorded
+from geared_axis import geared
 
 from hil.diagnosis.search import forward_selection
 from hil.diagnosis.search.initial_values import claimable
@@ -30,6 +32,23 @@ def test_a_spring_that_a_later_fit_moves_out_of_reach_becomes_a_load() -> None:
     load, other = forward_selection.claimed(found).terms
     assert (load.effect, other.effect) == ("constant_load", "current_loop_lag")
     assert load.values == pytest.approx((0.8,), rel=0.02)
+
+
+@pytest.mark.parametrize(("arc_rad", "effect"), [(0.003, "constant_load"), (0.4, "gravity_torque")])
+def test_gravity_over_an_arc_that_does_not_tell_its_size_is_a_load(arc_rad: float, effect: str) -> None:
+    owner, gravity = geared(), Term("gravity_torque", 0, (8.0, 0.9))
+    strokes = [
+        {"kind": "sine_squared", "to_m": to, "feed_m_s": max(arc_rad, 0.02)}
+        for to in (arc_rad, 0.0, arc_rad / 2.0, 0.0)
+    ]
+    profile = moves([{"kind": "dwell", "duration_s": 0.1}, *strokes])
+    found = fitted(
+        Hypothesis(owner, (gravity,)), [take(recorded(owner, gravity, profile=profile, torque_noise_n_m=1.0), owner)]
+    )
+    (term,) = forward_selection.claimed(found).terms
+    assert term.effect == effect
+    if effect == "constant_load":
+        assert term.values == pytest.approx((8.0 * math.sin(0.9 + arc_rad / 2.0) / 10.0,), rel=0.02)
 
 
 @pytest.mark.parametrize(

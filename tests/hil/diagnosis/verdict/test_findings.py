@@ -153,6 +153,18 @@ def test_a_little_drag_is_the_form_of_a_falling_curve(terms: tuple[Term, ...]) -
     }, "the bench has the curve as it was fitted"
 
 
+def test_what_is_found_beside_an_effect_is_not_its_equal() -> None:
+    load, slope = Term("constant_load", 0, (0.3,)), Term("cumulative_lead_error", 0, (1e-4,))
+    train, held_out = runs(load, slope), runs(load, slope, seed=2)
+    plain, both = fitted(train), fitted(train, load, slope)
+    rivals = {load.key: [RivalFit.of(fitted(train, one), 1.0) for one in (slope, Term("spring_load", 0, (1e3, 0.0)))]}
+    search = searched(plain, plain, both, rivals, {one.key: 900.0 for one in (load, slope)})
+    found = findings(search, both, cross_validate(plain, both, held_out).ablations, {}, held_out)
+    equals = {one.effect: one.equivalents for one in found}
+    assert "spring_load" in equals["constant_load"]
+    assert slope.effect not in equals["constant_load"]
+
+
 def test_a_drag_that_may_be_something_else_is_told() -> None:
     load = Term("torque_constant_saturation", 0, (0.01,))
     _, forms, found = diagnosed((FALLING, drag(0.02)), {drag(0.02).key: load})

@@ -83,6 +83,7 @@ class Finding(ResultPart):
     train: PulseTrain | None = Field(None, description="period of the windows, if they have one")
     sentence: str
     form: str = Field("", description="term of the fit that only corrects the form of its curve")
+    rate: str = Field("", description="strength per minute, of a change whose end is not told")
     needed: str = Field("", description="residual energy without it, on training and on held-out recordings")
 
 

@@ -48,13 +48,8 @@ def sentence(term: Term, bench: Bench, errors: TermErrors | None = None) -> str:
             most = max(_LITTLE * max(sizes), abs(value) + error if abs(value) < error else 0.0)
         bound = f"less than {value_in_words(most, parameter, bench)}"
         values[parameter.name] = bound if abs(value) < most else _told(value, error, parameter, bench)
-    if errors and told_by.rate and (duration := _open_end(mechanism, given, of_values)):
-        text = told_by.rate
-        per_minute = _MINUTE_S / duration
-        strength = mechanism.parameters[mechanism.strength]
-        values["rate"] = value_in_words(
-            per_minute * given[mechanism.strength], strength, bench, per_minute * errors.strength
-        )
+    if told_by.rate and (rate := rate_in_words(term, bench, errors)):
+        text, values["rate"] = told_by.rate, rate
     orders = mechanism.indices(Role.ORDER)
     values["wave"] = wave(given[orders[0]], bench, of_values[orders[0]]) if orders else ""
     values["viscous_speed"] = quantity(bench.axis.physics().viscous_speed, "m/s" if axis.linear else "rad/s")
@@ -74,6 +69,16 @@ def _told(value: float, error: float, parameter: Parameter, bench: Bench) -> str
         return f"{_UNTOLD.get(parameter.dimension, 'a value')} that is not told"
     factor, unit = reading_unit(unit_in(bench, parameter), value)
     return f"{' ± '.join(with_error(factor * value, factor * error))} {unit}".rstrip()
+
+
+def rate_in_words(term: Term, bench: Bench, errors: TermErrors | None) -> str:
+    """Strength per minute of a change that goes on beyond the recording; "" for another one."""
+    mechanism = BY_ID[term.effect]
+    duration = _open_end(mechanism, term.values, errors.values) if errors and mechanism.text.rate else 0.0
+    if not errors or not duration:
+        return ""
+    per_minute, strength = _MINUTE_S / duration, mechanism.parameters[mechanism.strength]
+    return value_in_words(per_minute * term.values[mechanism.strength], strength, bench, per_minute * errors.strength)
 
 
 def _open_end(mechanism: Mechanism, values: Sequence[float], errors: Sequence[float]) -> float:

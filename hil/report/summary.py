@@ -47,7 +47,9 @@ def print_diagnosis(result: Result) -> None:
 
 
 def _size(finding: Finding) -> str:
-    """The first parameter of a finding, its strength; empty for windows, which have one each."""
+    """The first parameter of a finding, its strength, or its rate; empty for windows, which have one each."""
+    if finding.rate:
+        return f"{finding.rate} per minute"
     first = next(iter(finding.parameters.values()), None)
     if first is None:
         return ""

@@ -15,7 +15,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Finding, Rival
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
-from hil.diagnosis.sentence import TermErrors, sentence
+from hil.diagnosis.sentence import TermErrors, rate_in_words, sentence
 from hil.diagnosis.stages import Searched
 from hil.diagnosis.value import Correction, Value
 from hil.diagnosis.verdict.confidence import confidence
@@ -100,6 +100,7 @@ def findings(
                         for other, law in forms.items()
                         if law == index
                     ),
+                    rate=rate_in_words(_normal(term), bench, _errors(final, index, deviations)),
                     needed=_needed(ablation),
                 ),
             )

@@ -110,7 +110,9 @@ def _text(path: Path) -> ForeignTable:
             remarks.append(f"{name}: text such as {rows.texts[name].text!r}, no numbers")
     titles = {name: header.titles.get(name, name) for name in names}
     told = described(dialect.above, list(titles.values()))
-    of_lines = {title: unit for title, (_, unit) in told.items()} | told_units(dialect.above, list(titles.values()))
+    of_lines = {title: unit for title, (_, unit) in told.items()}
+    if not header.units:
+        of_lines |= told_units(dialect.above, list(titles.values()))
     listed = listed_scales(dialect.above, list(told))
     of_list = {name: listed.scales[title] for name, title in titles.items() if title in listed.scales}
     header.row_scales = of_list | header.row_scales

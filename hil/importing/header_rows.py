@@ -12,7 +12,8 @@ from math import isfinite
 from hil.files.date_stamps import is_date
 from hil.importing.column_names import label, plain_words
 from hil.importing.lexicon import Quantity, RowKind, lexicon
-from hil.importing.listed_names import listed_names
+from hil.importing.listed_names import NAMELESS, listed_names
+from hil.importing.listed_scales import scale_field, value_and_unit
 from hil.importing.map_file import SECONDS
 from hil.importing.number_form import NumberForm, number_of
 from hil.importing.text_lines import shown, split_line, times_of_groups
@@ -20,7 +21,6 @@ from hil.importing.units import factor_and_unit, unit_named, unit_of_text
 
 COMMENT = re.compile(r"^\s*(#|%|//)+\s?")
 _UNIT = re.compile(r"[\[(]?\s*[a-zA-Zµμ°%‰Ω·/^*\d. _-]{0,14}\s*[\])]?(\s*\(\w*\))?")
-NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _BRACKET = re.compile(r"[\[(](.*?)[\])]")
 _WORD = re.compile(r"[^\W\d]")
 _NEAR = 4  # lines above the numbers whose text may be that of the columns, where they have none else
@@ -71,7 +71,7 @@ class Header:
 
 def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberForm, counted: bool = False) -> Header:
     """Read the lines above `width` columns of numbers; `counted`: the first one numbers the rows, perhaps nameless."""
-    listed = listed_names(lines, delimiter, width)
+    listed = listed_names(lines, delimiter, width, counted)
     of_list = listed.lines if listed else frozenset[int]()
     read = (
         _row(index, line, delimiter, width, form, counted) for index, line in enumerate(lines) if index not in of_list
@@ -93,6 +93,7 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
     if named is not None and named.fields == header.names and named.text == lines[named.line]:
         header.line = named.line
     used = {named.line} if named else set[int]()
+    of_scales = _add_scale(header, RowKind.SCALE, listed.scales if listed else {}, form)
     header.titles = _titles(named, texts, header.names)
     for row in rows:
         given = {name: text for name, text in zip(header.names, row.fields, strict=True) if text}
@@ -100,7 +101,7 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
             case RowKind.UNITS if not header.units:
                 header.units = given
             case RowKind.SCALE | RowKind.OFFSET:
-                _add_scale(header, row.kind, given, form)
+                of_scales |= _add_scale(header, row.kind, given, form)
             case RowKind.PERIOD:
                 bracket = _BRACKET.search(row.text)
                 unit = SECONDS.get(unit_named(bracket[1]) or "", 0.0) if bracket else 1.0
@@ -113,6 +114,8 @@ def read_header(lines: Sequence[str], delimiter: str, width: int, form: NumberFo
             case _ if row is not named:
                 header.unused[row.line] = row.text
         used.add(row.line)
+    of_volts = {name: unit.removesuffix("/V").strip() for name, unit in of_scales.items() if unit.endswith("/V")}
+    header.units = of_scales | header.units | of_volts
     header.units |= {
         name: text for name, text in header.words.items() if name not in header.units and unit_of_text(text) is not None
     }
@@ -204,6 +207,8 @@ def _kind(fields: Sequence[str], form: NumberForm) -> RowKind:
     named = [one for one in fields if one]
     if all(number_of(one, form) is not None for one in named):
         return RowKind.UNKNOWN
+    if all((told := scale_field(one)) and told.value is not None for one in named):
+        return RowKind.SCALE
     if all(re.sub(r"\d+$", "", one.lower()) in lexicon().types for one in named):
         return RowKind.TYPES
     factors = [factor_and_unit(one) for one in named]
@@ -277,9 +282,19 @@ def _number(text: str, form: NumberForm) -> float | None:
     return next((one for mark in (form.decimal, ".", ",") if (one := number_of(text, NumberForm(mark)))), None)
 
 
-def _add_scale(header: Header, kind: RowKind, given: dict[str, str], form: NumberForm) -> None:
+def _add_scale(header: Header, kind: RowKind, given: dict[str, str], form: NumberForm) -> dict[str, str]:
+    """Add the factors or offsets of a row by column; returns the units that stand behind them."""
+    units = dict[str, str]()
     for name, text in given.items():
-        value = _number(text, form)
-        if value is not None and isfinite(value):
+        told = scale_field(text)
+        value, unit = (told.value, told.unit) if told else value_and_unit(text) or (_number(text, form), "")
+        if value is None or not isfinite(value):
+            header.notes.append(f"header: {text!r} of {name} is not read; give it as scale of this channel in the map")
+        else:
+            units |= {name: unit} if unit else {}
+            if unit.endswith("/V"):  # the values are volts
+                header.scales[name] = value, 0.0
+                continue
             factor, offset = header.row_scales.get(name, (1.0, 0.0))
             header.row_scales[name] = (value, offset) if kind is RowKind.SCALE else (factor, value)
+    return units

@@ -5,23 +5,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.importing.lexicon import lexicon
+from hil.importing.listed_scales import scale_field
 from hil.importing.text_lines import split_line
 
+NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _ENDS = " \t;,|=:\"'"
 
 
 @dataclass(frozen=True)
 class ListedNames:
-    """Names of all columns in their order, and the lines (from 0) that list them."""
+    """Names of all columns in their order, the lines (from 0) that list them, and the factors behind the names."""
 
     names: tuple[str, ...]
     lines: frozenset[int]
+    scales: dict[str, str]
 
 
-def listed_names(lines: Sequence[str], delimiter: str, width: int) -> ListedNames | None:
+def listed_names(lines: Sequence[str], delimiter: str, width: int, counted: bool = False) -> ListedNames | None:
     """Names of `width` columns, numbered from 0 or 1 in turn and all different; None without such a list.
 
-    A row that has such numbers in its fields gives the names itself.
+    A first column that numbers the rows (`counted`) may be without a name. A row that has such numbers in its fields
+    gives the names itself.
     """
     words = "|".join(lexicon().enumerated)
     place = re.compile(
@@ -31,16 +35,21 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int) -> ListedName
     given: list[tuple[int, int, str]] = []
     for index, line in enumerate(lines):
         found = list(place.finditer(line))
-        if len(found) == width == len(split_line(line, delimiter)):
+        if len(found) >= width - counted and len(split_line(line, delimiter)) == width:
             return None  # a row of names, Ch1;Ch2: `unit_lines` reads what lines above say of them
         for number, match in enumerate(found):
             end = found[number + 1].start() if number + 1 < len(found) else len(line)
             name = line[match.end() : end].strip(_ENDS)
             if re.search(r"[^\W\d]", name):
                 given.append((index, int(match[1] or match[2]), name))
-    for first in (0, 1):
-        numbered = [one for one in given if first <= one[1] < first + width]
-        names = tuple(name for _, _, name in numbered)
-        if [number for _, number, _ in numbered] == list(range(first, first + width)) and len(set(names)) == width > 1:
-            return ListedNames(names, frozenset(index for index, _, _ in numbered))
+    for first, several in ((0, width), (1, width), *(((1, width - 1),) if counted else ())):
+        numbered = [one for one in given if first <= one[1] < first + several]
+        parts = [re.split(r"\s{2,}|\t", name, maxsplit=1) for _, _, name in numbered]
+        told = all(len(part) == 2 and scale_field(part[1]) for part in parts)
+        names = tuple(part[0] for part in parts) if told else tuple(name for _, _, name in numbered)
+        in_turn = [number for _, number, _ in numbered] == list(range(first, first + several))
+        if in_turn and len(set(names)) == several > 1:
+            scales = {part[0]: part[1] for part in parts} if told else {}
+            lacking = [f"{NAMELESS}1"] * (width - several)
+            return ListedNames((*lacking, *names), frozenset(index for index, _, _ in numbered), scales)
     return None

@@ -6,12 +6,18 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from hil.importing.lexicon import RowKind, lexicon
+from hil.importing.units import unit_named
 
 _BETWEEN = re.compile(r"[;\t|]|,(?!\d)|(?<!\d),")  # a comma between two digits is the decimal mark
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
 _VALUE = re.compile(
-    rf"(?:1\s*[/:]\s*(?P<part>[1-9]\d*)|(?P<number>{_NUMBER}))\s*(?P<unit>[^\d\s/:]\D*2?)?", re.IGNORECASE
+    rf"(?P<number>{_NUMBER})(?:\s*[/:]\s*(?P<by>\d+)|(?:\^|\*\*)(?P<power>-?\d+))?"
+    r"\s*(?P<unit>(?:1/)?[^\d\s/:.,].*)?",
+    re.IGNORECASE,
 )
+_MOST_BITS = 64  # power of two
+_PER_COUNT = re.compile(r"\s*/\s*(lsb|counts?|cts?|digits?|inc|bit)$", re.IGNORECASE)
+_PER_VOLT = re.compile(r"\s*/\s*V$")
 _FRACTION = re.compile(rf"(?!\d+$){_NUMBER}", re.IGNORECASE)
 
 
@@ -49,11 +55,24 @@ def scale_field(text: str) -> ScaleField | None:
     if match is None or not re.search(r"\d", text):
         return None
     kind = RowKind.OFFSET if match["offset"] else RowKind.SCALE
-    told = _VALUE.fullmatch(text[match.end() :].rstrip(" )"))
+    value, unit = value_and_unit(text[match.end() :]) or (None, "")
+    return ScaleField(kind, value if value or kind is RowKind.OFFSET else None, unit)
+
+
+def value_and_unit(text: str) -> tuple[float, str] | None:
+    """Number and unit of a text: 1e-3, 1/1000 mm, =360/65536 deg, 2^-20 rev, 200 mm/V, 0.5 um/LSB; None: another."""
+    told = _VALUE.fullmatch(text.strip(" =:()"))
     if told is None:
-        return ScaleField(kind, None)
-    value = 1.0 / float(told["part"]) if told["part"] else float(told["number"].replace(",", "."))
-    return ScaleField(kind, value if value or kind is RowKind.OFFSET else None, told["unit"] or "")
+        return None
+    unit = _PER_COUNT.sub("", told["unit"] or "")
+    if unit and unit_named(_PER_VOLT.sub("", unit)) is None:
+        return None
+    value = float(told["number"].replace(",", "."))
+    if told["power"]:
+        value = value ** int(told["power"]) if abs(int(told["power"])) <= _MOST_BITS else 0.0
+    if told["by"]:
+        value = value / float(told["by"]) if float(told["by"]) else 0.0
+    return value, unit
 
 
 def listed_scales(lines: Sequence[str], names: Sequence[str]) -> ListedScales:

@@ -6,8 +6,8 @@ from hil.arrays import FloatArray
 from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label, effort_of_words
 from hil.importing.encoder_counts import angle_unit
-from hil.importing.header_rows import NAMELESS
 from hil.importing.lexicon import Constant, Quantity
+from hil.importing.listed_names import NAMELESS
 from hil.importing.map_draft import MapDraft
 from hil.importing.relations import SAME_POSITION, proportional
 from hil.importing.roles import Roles

@@ -22,7 +22,8 @@ QUANTITY_OF_UNIT = (
 # one letter at the end of a name is a unit only after a word: x_m may be in metres, q_m of the motor
 _BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 _ANY_BRACKETS = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]")
-_FACTOR = re.compile(r"(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
+_HUNDREDTH = re.compile(r"(?P<unit>[^\d\s/]+)\s*/\s*(?P<part>10+)")  # mm/100
+_FACTOR = re.compile(r"[x×]?(?:(?P<value>\d+(?:[.,]\d+)?)|1/(?P<part>\d+))\s*[*x·]?\s*(?P<unit>[^\d\s/].*)")
 _OF_COUNT = re.compile(r"([^\s/]+)(?:\s*/\s*|\s+)(\w+)")
 LEAST_ALONE = 3  # letters of a unit that is a name by itself, or of revolutions: motor_u is a voltage
 _BITS = re.compile(r"(?<=[a-z])\d+(bit)?$")  # counts16bit
@@ -71,6 +72,9 @@ def factor_and_unit(text: str) -> tuple[float, str] | None:
 
     None for a unit itself.
     """
+    part = _HUNDREDTH.fullmatch(text.strip(" []()"))
+    if part and unit_named(part["unit"]) is not None:
+        return 1.0 / float(part["part"]), part["unit"]
     match = _FACTOR.fullmatch(text.strip(" []()"))
     of_count = _OF_COUNT.fullmatch(match["unit"]) if match else None
     if match and of_count and unit_named(of_count[2]) == "counts" and UNITS.get(unit_named(of_count[1]) or ""):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from foreign_axis import axis
 
 from hil.importing.draft_map import draft_map
-from hil.importing.listed_scales import listed_scales
+from hil.importing.listed_scales import listed_scales, value_and_unit
 from hil.importing.unit_lines import described
 
 AXIS = axis()
@@ -106,3 +107,90 @@ def test_names_of_groups_above_the_names_take_no_row_of_names(tmp_path: Path) ->
     columns = {one.channel: str(one.entry["column"]) for one in draft_map(path).channels}
     assert columns["position_command_m"].startswith("pos_set")
     assert columns["torque_n_m"].startswith("torque")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("=360/65536 deg", (360.0 / 65536.0, "deg")),
+        ("2^-20 rev", (2.0**-20, "rev")),
+        ("1e-4 mm", (1e-4, "mm")),
+        ("0,1 1/min", (0.1, "1/min")),
+        ("200 mm/V", (200.0, "mm/V")),
+        ("0.5 um/LSB", (0.5, "um")),
+        ("0,001 x Mn", None),
+        ("0x6064", None),
+        ("2..3", None),
+        ("", None),
+    ],
+)
+def test_a_number_before_a_unit_may_be_a_fraction_or_a_power(text: str, told: tuple[float, str] | None) -> None:
+    found = value_and_unit(text)
+    assert found == (None if told is None else (pytest.approx(told[0], rel=1e-12), told[1]))
+
+
+def drafted(path: Path, above: str, row: str, **columns: np.ndarray) -> dict[str, dict[str, object]]:
+    """Entries of the map of a file with lines `above` rows that are formatted by `row`, by channel."""
+    rows = (row.format(*values) for values in zip(*columns.values(), strict=True))
+    path.write_text(above + "\n".join(rows) + "\n")
+    return {one.channel: one.entry for one in draft_map(path).channels}
+
+
+INDEX = np.arange(AXIS["t"].size)
+
+
+def test_a_row_of_resolutions_is_no_row_of_names(tmp_path: Path) -> None:
+    above = "index,MOTENC,TQ,CMD\nLSB=1,LSB=2^-20 rev,LSB=0.01 Nm,LSB=1e-4 mm\n# fs=1000 Hz\n"
+    turns, torque, command = AXIS["angle"] / (2.0 * np.pi) * 2**20, AXIS["torque"] / 0.01, AXIS["x_set"] / 1e-4
+    found = drafted(tmp_path / "a.csv", above, "{},{:.0f},{:.0f},{:.0f}", i=INDEX, a=turns, b=torque, c=command)
+    motor, effort = found["motor_position_rad"], found["torque_n_m"]
+    assert (motor["column"], motor["unit"], motor["scale"]) == ("MOTENC", "rev", pytest.approx(2.0**-20))
+    assert (effort["column"], effort["unit"], effort["scale"]) == ("TQ", "N m", pytest.approx(0.01))
+
+
+def test_an_italian_row_of_scales_and_hundredths_of_a_unit_are_read(tmp_path: Path) -> None:
+    above = "Campione;PosEff;CoppiaEff;PosTeor\n[n];[mm/100];[Nm];[mm/100]\n"
+    above += 'scala 1;scala 1;scala 0,01;scala 1\n"Periodo";"1,0 ms"\n'
+    found = drafted(
+        tmp_path / "a.csv",
+        above,
+        "{};{:.0f};{:.0f};{:.0f}",
+        i=INDEX,
+        a=AXIS["x_act"] / 0.01,
+        b=AXIS["torque"] / 0.01,
+        c=AXIS["x_set"] / 0.01,
+    )
+    motor = found["motor_position_rad"]
+    assert (motor["column"], motor["unit"], motor["scale"]) == ("PosEff", "mm", pytest.approx(0.01))
+    assert found["position_command_m"]["column"] == "PosTeor"
+    assert found["torque_n_m"]["scale"] == pytest.approx(0.01)
+
+
+def test_a_scale_per_volt_turns_the_volts_of_a_scope_into_its_unit(tmp_path: Path) -> None:
+    above = "Label,POS,SPD,TRQ\nVertical Units,V,V,V\nScale,200 mm/V,400 rpm/V,2 Nm/V\n\nTIME,CH1,CH2,CH3\n"
+    found = drafted(
+        tmp_path / "a.csv", above, "{:.4f},{:.6f},{:.5f},{:.5f}",
+        t=AXIS["t"], a=AXIS["x_act"] / 200.0, b=AXIS["speed"] * 30.0 / np.pi / 400.0, c=AXIS["torque"] / 2.0,
+    )  # fmt: skip
+    motor, effort = found["motor_position_rad"], found["torque_n_m"]
+    assert (motor["column"], motor["unit"], motor["scale"]) == ("POS", "mm", pytest.approx(200.0))
+    assert (effort["column"], effort["unit"], effort["scale"]) == ("TRQ", "N m", pytest.approx(2.0))
+
+
+def test_a_list_of_channels_by_number_tells_names_and_factors_beside_the_number_of_the_row(tmp_path: Path) -> None:
+    above = "Abtastzeit   1,0 ms\nKanal 1   Lageistwert   Faktor 1e-3 mm\nKanal 2   Momentenistwert   Faktor 0,01 Nm\n"
+    found = drafted(
+        tmp_path / "a.trc", above, "{:7d}{:10.0f}{:10.0f}", i=INDEX, a=AXIS["x_act"] / 1e-3, b=AXIS["torque"] / 0.01
+    )
+    motor, effort = found["motor_position_rad"], found["torque_n_m"]
+    assert (motor["column"], motor["unit"], motor["scale"]) == ("Lageistwert", "mm", pytest.approx(1e-3))
+    assert (effort["column"], effort["unit"], effort["scale"]) == ("Momentenistwert", "N m", pytest.approx(0.01))
+
+
+def test_a_unit_row_that_begins_with_an_empty_field_is_no_list_without_the_time(tmp_path: Path) -> None:
+    """The number of the row got the unit of the time, and was taken for the clock: half the time, twice the lead."""
+    above = "Zyklus;2 ms\n\nNr.;Zeit;SollPos;IstPos;Moment\n;ms;mm;mm;Nm\n"
+    path = tmp_path / "a.csv"
+    rows = zip(1 + INDEX, 2.0 * INDEX, AXIS["x_set"], AXIS["x_act"], AXIS["torque"], strict=True)
+    path.write_text(above + "".join("{};{:.1f};{:.5f};{:.4f};{:.4f}\n".format(*row) for row in rows))
+    assert draft_map(path).clock.time_s[-1] == pytest.approx(2e-3 * INDEX[-1])

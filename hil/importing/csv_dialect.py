@@ -142,9 +142,12 @@ def _layout(path: Path, body: list[str]) -> _Layout:
 
 
 def _first_row(path: Path, lines: Sequence[str], layout: _Layout) -> int:
-    """Index of the first row of numbers, with others below it."""
+    """Index of the first row of numbers, with others below it, none of which is of a kind of its own: zero,0,524288."""
     filled = [(index, line) for index, line in enumerate(lines) if line.strip()]
-    rows = [(index, _is_row(split_line(COMMENT.sub("#", line), layout.delimiter), layout)) for index, line in filled]
+    split = [(index, split_line(COMMENT.sub("#", line), layout.delimiter)) for index, line in filled]
+    kinds = Counter(fields[0] for _, fields in split) if not layout.read[0] else Counter[str]()
+    alone = {text for text, times in kinds.items() if text and times == 1 and len(kinds) < len(split) / 2}
+    rows = [(index, _is_row(fields, layout) and fields[0] not in alone) for index, fields in split]
     for place, (index, _) in enumerate(rows):
         if all(good for _, good in rows[place : place + _FOLLOW]):
             return index

@@ -19,7 +19,7 @@ from hil.importing.foreign_columns import as_measured, check_foreign, format_of,
 from hil.importing.header_rows import read_factor
 from hil.importing.header_values import HeaderValue, header_text
 from hil.importing.lexicon import Constant
-from hil.importing.listed_scales import listed_scales
+from hil.importing.listed_scales import listed_scales, value_and_unit
 from hil.importing.map_file import SECONDS, CsvOptions
 from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
@@ -180,12 +180,17 @@ def _counted_period(lines: Sequence[str], rows: int) -> dict[Constant, HeaderVal
 
 
 def _mat(path: Path) -> ForeignTable:
-    columns, others, stated = dict[str, FloatArray](), [], Stated()
+    columns, others, stated, told = dict[str, FloatArray](), [], Stated(), dict[str, tuple[float, str]]()
     arrays, units = load_variables(path)
     for name, variable in arrays.items():
         values = np.asarray(variable)
         if (text := _text_in(values)) is not None:
             stated.texts[name] = text
+            pairs = values.tolist() if values.dtype.kind == "O" and values.shape[1:] == (2,) else []
+            cells = [[_text_in(np.asarray(cell)) or "" for cell in pair] for pair in pairs]
+            told |= {
+                key: found for key, cell in cells if (found := value_and_unit(cell.partition("(")[0])) and found[1]
+            }
         elif values.dtype.kind not in "fiub":
             others.append(name)
         elif values.size == 1:
@@ -202,7 +207,9 @@ def _mat(path: Path) -> ForeignTable:
             f"{path}: holds no vector of numbers (there are {listed(others) or 'no variables'}), allowed a vector "
             "per channel or a matrix with a column per channel; save the vectors themselves, not a structure"
         )
-    return _with_stated(ForeignTable(path, columns, units, remarks=tuple(remarks)), stated)
+    units |= {name: unit for name, (_, unit) in told.items() if name in columns and not units.get(name)}
+    scales = {name: (value, 0.0) for name, (value, unit) in told.items() if units.get(name) == unit}
+    return _with_stated(ForeignTable(path, columns, units, scales=scales, remarks=tuple(remarks)), stated)
 
 
 def _text_in(values: NDArray[Any]) -> str | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_axis import axis
+from scipy.io import savemat
 
 from hil.importing.draft_map import draft_map
 from hil.importing.listed_scales import listed_scales, value_and_unit
@@ -194,3 +195,26 @@ def test_a_unit_row_that_begins_with_an_empty_field_is_no_list_without_the_time(
     rows = zip(1 + INDEX, 2.0 * INDEX, AXIS["x_set"], AXIS["x_act"], AXIS["torque"], strict=True)
     path.write_text(above + "".join("{};{:.1f};{:.5f};{:.4f};{:.4f}\n".format(*row) for row in rows))
     assert draft_map(path).clock.time_s[-1] == pytest.approx(2e-3 * INDEX[-1])
+
+
+def test_rows_of_another_kind_by_their_first_field_are_no_rows_of_numbers(tmp_path: Path) -> None:
+    above = "dump;axis J1\nname,TICK,ENC_MOT,TRQ\nLSB,=1e-3 s,=360/131072 deg,=0.01 Nm\nzero,0,2211,0\n"
+    counts = 2211 + AXIS["angle"] / (2.0 * np.pi) * 131072
+    found = drafted(tmp_path / "a.csv", above, "data,{},{:.0f},{:.0f}", i=INDEX, a=counts, b=AXIS["torque"] / 0.01)
+    motor, effort = found["motor_position_rad"], found["torque_n_m"]
+    assert (motor["column"], motor["unit"], motor["scale"]) == ("ENC_MOT", "deg", pytest.approx(360.0 / 131072.0))
+    assert (effort["column"], effort["unit"]) == ("TRQ", "N m")
+    assert draft_map(tmp_path / "a.csv").clock.time_s.size == INDEX.size
+
+
+def test_cells_of_a_mat_file_tell_unit_and_resolution_of_its_vectors(tmp_path: Path) -> None:
+    cells = np.array([["x_act", "0.1 um/LSB"], ["iq", "2e-3 N/LSB (peak)"]], dtype=object)
+    values = {
+        "x_act": np.round(1e4 * AXIS["x_act"]).astype(np.int32),
+        "iq": np.round(AXIS["torque"] / 2e-3).astype(np.int16),
+    }
+    savemat(tmp_path / "a.mat", {"t": AXIS["t"], **values, "chinfo": cells})
+    found = {one.channel: one.entry for one in draft_map(tmp_path / "a.mat").channels}
+    motor, effort = found["motor_position_m"], found["force_n"]
+    assert (motor["unit"], motor["scale"]) == ("um", pytest.approx(0.1))
+    assert (effort["unit"], effort["scale"]) == ("N", pytest.approx(2e-3))

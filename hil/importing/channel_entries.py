@@ -37,16 +37,14 @@ class ChannelEntries:
         self.positions = PositionUnits(draft, labels, roles, live, period_s)
         self.units, self.asked = self.positions.units, self.positions.asked
         self.effort_si = effort_si(self.positions.effort, draft)
-        self.kind = AxisKind.ROTARY
-        self.motor_sign = 1
+        self.kind, self.motor_sign = AxisKind.ROTARY, 1
         self.per_count = 1.0  # SI units of the motor per count, if it is in counts
         self.unsized: dict[str, float] = {}  # keys of the size of its count that are asked, with what stands for them
         self.ratio = 1.0  # turns of the motor for each of its position, which is that of the load
 
     def fill(self) -> None:
         """Add the entries. Raises InputError: no column can go with the motion, or two units contradict each other."""
-        roles = self.roles
-        if roles.motor is None:
+        if (roles := self.roles).motor is None:
             self._velocity_only()
         else:
             self.positions.choose()
@@ -211,6 +209,8 @@ class ChannelEntries:
                 given += "; of a linear scale write counts_per_m in its place, and lead_m above the line 'channels:'"
             keys |= {key: size * ratio for key, size in self.unsized.items()}
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
+        elif unit == "counts" and channel == "table_position_m" and (count := self.positions.count_by_command(name)):
+            keys |= count
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             per_count = self.per_count / (1.0 if same else abs(factor))
             lever = (self.draft.lead_m or 0.0) / (2.0 * pi) if motor == "rad" else 1.0

@@ -138,6 +138,19 @@ class PositionUnits:
                 return (float(whole) if abs(ratio / whole - 1.0) < USUAL else float(f"{ratio:.6g}")), speed.column
         return None
 
+    def count_by_command(self, name: str) -> dict[str, object]:
+        """Unit and size of a count of the second encoder by the set-point that it follows; {} if that is no angle."""
+        command = self.roles.command
+        told = self.labels[command].unit if command else None
+        if command is None or told not in UNITS or UNITS[told][0] != "rad" or command in self.asked:
+            return {}
+        relation = proportional(self.live[command], self.live[name])
+        size = float(f"{abs(relation.factor):.6g}")
+        if relation.share <= SAME_POSITION:
+            return {}
+        self.draft.unsure.append(f"{name}: counts of {size:g} {told} are taken, by the set-point {command}")
+        return {"unit": told, "scale": size}
+
     def _take(self, column: str, choice: UnitChoice) -> None:
         self.units[column] = choice.unit
         if choice.asked:

@@ -218,3 +218,17 @@ def test_cells_of_a_mat_file_tell_unit_and_resolution_of_its_vectors(tmp_path: P
     motor, effort = found["motor_position_m"], found["force_n"]
     assert (motor["unit"], motor["scale"]) == ("um", pytest.approx(0.1))
     assert (effort["unit"], effort["scale"]) == ("N", pytest.approx(2e-3))
+
+
+def test_a_second_encoder_in_counts_has_their_size_by_the_set_point_that_it_follows(tmp_path: Path) -> None:
+    """Behind a gear: 8192 counts per turn of the motor, 3600 per degree of the table, a ratio of 90."""
+    above = "MOT = codeur moteur (8192 pt/tr)\nT\tPLAT\tMOT\tC\tCONS\n[s]\t[pt]\t[pt]\t[N.m]\t[deg]\n"
+    turns = AXIS["angle"] / (2.0 * np.pi)
+    late = np.interp(AXIS["t"] + 0.004, AXIS["t"], turns, right=turns[-1])
+    found = drafted(
+        tmp_path / "a.txt", above, "{:.4f}\t{:.0f}\t{:.0f}\t{:.4f}\t{:.6f}",
+        t=AXIS["t"], a=turns / 90.0 * 1296000.0, b=turns * 8192.0, c=AXIS["torque"], d=360.0 * late / 90.0,
+    )  # fmt: skip
+    table = found["table_position_m"]
+    assert (table["column"], table["unit"]) == ("PLAT", "deg")
+    assert table["scale"] == pytest.approx(1.0 / 3600.0, rel=2e-3)

@@ -17,6 +17,8 @@ _WORDS = {
     "ball nut": "gear",
     "nut": "gear",
     "ball screw": "gear",
+    "screw grows": "ratio of the encoders grows",
+    "of its length": "of its value",
     "lead": "transmission",
     "table": "load",
     "Table": "Load",

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hil.importing.lexicon import lexicon
-from hil.importing.listed_scales import scale_field
+from hil.importing.listed_scales import fields_of, scale_field
 from hil.importing.text_lines import split_line
+from hil.importing.units import unit_named
 
 NAMELESS = "column "  # beginning of the name of a column over which nothing stands
 _ENDS = " \t;,|=:\"'"
@@ -44,12 +45,21 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int, counted: bool
                 given.append((index, int(match[1] or match[2]), name))
     for first, several in ((0, width), (1, width), *(((1, width - 1),) if counted else ())):
         numbered = [one for one in given if first <= one[1] < first + several]
-        parts = [re.split(r"\s{2,}|\t", name, maxsplit=1) for _, _, name in numbered]
-        told = all(len(part) == 2 and scale_field(part[1]) for part in parts)
-        names = tuple(part[0] for part in parts) if told else tuple(name for _, _, name in numbered)
+        parts = [re.split(r"\s{2,}|\s*[\t;|]\s*", name, maxsplit=1) for _, _, name in numbered]
+        behind = {part[0]: _size(part[1]) for part in parts if len(part) == 2}
+        told = len(behind) == several and sum(map(bool, behind.values())) > several / 2
+        names = tuple(behind) if told else tuple(name for _, _, name in numbered)
         in_turn = [number for _, number, _ in numbered] == list(range(first, first + several))
         if in_turn and len(set(names)) == several > 1:
-            scales = {part[0]: part[1] for part in parts} if told else {}
+            scales = {name: size for name, size in behind.items() if size} if told else {}
             lacking = [f"{NAMELESS}1"] * (width - several)
             return ListedNames((*lacking, *names), frozenset(index for index, _, _ in numbered), scales)
     return None
+
+
+def _size(text: str) -> str:
+    """Factor and unit of a channel in the fields behind its name: "mm; scale 0,001" -> scale 0,001 mm; "" if none."""
+    fields = fields_of(text)
+    unit = next((field for field in fields if unit_named(field)), "")
+    scale = next((field for field in fields if scale_field(field)), "scale 1" if unit else "")
+    return f"{scale} {unit}".strip()

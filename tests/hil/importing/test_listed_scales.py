@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_axis import axis
+from foreign_axis import LEAD_M, axis
 from scipy.io import savemat
 
 from hil.importing.draft_map import draft_map
@@ -232,3 +232,16 @@ def test_a_second_encoder_in_counts_has_their_size_by_the_set_point_that_it_foll
     table = found["table_position_m"]
     assert (table["column"], table["unit"]) == ("PLAT", "deg")
     assert table["scale"] == pytest.approx(1.0 / 3600.0, rel=2e-3)
+
+
+def test_a_list_of_channels_may_have_unit_and_factor_behind_semicolons(tmp_path: Path) -> None:
+    above = "Ts=1ms\n[CHANNELS]\nCh1=POS_REF; mm; scale 0,001\nCh2=POS_ACT; mm; scale 0,001\n"
+    above += "Ch3=N_ACT; LSB=0.01 rpm\nCh4=M_ACT; Nm; scale 0.01\n[DATA]\n"
+    found = drafted(
+        tmp_path / "a.trc", above, "{:.0f} {:.0f} {:.0f} {:.0f}",
+        a=AXIS["x_set"] / 1e-3, b=AXIS["x_act"] / 1e-3, c=AXIS["speed"] * 3000.0 / np.pi, d=AXIS["torque"] / 0.01,
+    )  # fmt: skip
+    motor, effort = found["motor_position_rad"], found["torque_n_m"]
+    assert (motor["column"], motor["unit"], motor["scale"]) == ("POS_ACT", "mm", pytest.approx(1e-3))
+    assert (effort["column"], effort["unit"], effort["scale"]) == ("M_ACT", "N m", pytest.approx(0.01))
+    assert draft_map(tmp_path / "a.trc").lead_m == pytest.approx(LEAD_M, rel=1e-3)

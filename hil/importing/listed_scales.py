@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from math import isfinite
 
 from hil.importing.lexicon import RowKind, lexicon
 from hil.importing.units import unit_named
@@ -69,10 +70,10 @@ def value_and_unit(text: str) -> tuple[float, str] | None:
         return None
     value = float(told["number"].replace(",", "."))
     if told["power"]:
-        value = value ** int(told["power"]) if abs(int(told["power"])) <= _MOST_BITS else 0.0
+        value = value ** int(told["power"]) if value in (2.0, 10.0) and abs(int(told["power"])) <= _MOST_BITS else 0.0
     if told["by"]:
         value = value / float(told["by"]) if float(told["by"]) else 0.0
-    return value, unit
+    return (value, unit) if isfinite(value) else None
 
 
 def listed_scales(lines: Sequence[str], names: Sequence[str]) -> ListedScales:

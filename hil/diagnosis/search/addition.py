@@ -14,7 +14,7 @@ from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
-from hil.diagnosis.search.initial_values import claimable, felt_by_motor, possible
+from hil.diagnosis.search.initial_values import claimable, possible, reads_wrong
 from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
@@ -185,15 +185,20 @@ def torque_of(
 
     Without it is also the twin of the bench file, if `given`: a fit whose other parameters pay for a term is worse.
 
-    It says nothing of what the motor does not feel: an error of the transmission on an axis without a spring, a growing
-    screw or an error of the second encoder on any. An error of the motor's encoder it tells: a motion that is read
-    late, or wrong over the angle, needs another torque.
+    An error of the transmission is no torque on an axis without a spring, nor is a slope of the lead, a growing screw
+    or an error of the second encoder on any axis. An error of the motor's encoder is: a motion that is read late, or
+    wrong over the angle, needs another torque.
     """
     mechanism = BY_ID[term.effect]
     variant = mechanism.variants[term.variant]
     if mechanism.block is Block.CONTROLLER or (in_measured_torque(term) and variant.stage is not Stage.CHANNEL):
         return None
-    if term.windows or not felt_by_motor(mechanism, variant, fit.bench):
+    of_table = mechanism.search.needs_table and mechanism.search.proportional  # of the lead or of its growth
+    if (
+        reads_wrong(term, fit.bench)
+        or term.windows
+        or (mechanism.in_transmission and (of_table or not fit.bench.axis.SPRINGS))
+    ):
         return None
     left, other = torque_missed(fit, data), torque_missed(without, data)
     if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion

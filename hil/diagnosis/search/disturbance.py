@@ -81,8 +81,7 @@ def orders(
     """
     rows = sum(run.motor.size for run in runs)
     every = [slice(None, None, max(_width(run.period_s) // 2, -(-rows // _MOST_ROWS))) for run in runs]
-    of = list(zip(runs, disturbances, weights or [np.ones(run.motor.size) for run in runs], every, strict=True))
-    at = [d.sliding[step] for _, d, _, step in of]
+    at = [d.sliding[step] for d, step in zip(disturbances, every, strict=True)]
     if sum(int(one.sum()) for one in at) < _FEWEST_ROWS:
         return [1.0, 2.0]
 
@@ -91,7 +90,10 @@ def orders(
 
     torque, velocity = on_rows(d.torque for d in disturbances), on_rows(d.velocity for d in disturbances)
     change = on_rows(np.gradient(d.velocity) for d in disturbances)
-    angle, weight = on_rows(run.motor for run in runs) * angle_per_unit, on_rows(one for _, _, one, _ in of)
+    angle, weight = (
+        on_rows(run.motor for run in runs) * angle_per_unit,
+        on_rows(weights or [np.ones(run.motor.size) for run in runs]),
+    )
     beside = np.column_stack([np.ones_like(torque), np.sign(velocity), velocity, change])
     taps = whitening_filter(torque, beside, at)
     basis, _ = np.linalg.qr(np.column_stack([filtered(column, at, taps) for column in beside.T]))

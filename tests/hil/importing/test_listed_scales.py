@@ -122,6 +122,8 @@ def test_names_of_groups_above_the_names_take_no_row_of_names(tmp_path: Path) ->
         ("0,001 x Mn", None),
         ("0x6064", None),
         ("2..3", None),
+        ("1e300^64", (0.0, "")),
+        ("1e999 mm", None),
         ("", None),
     ],
 )

@@ -198,11 +198,11 @@ LAWS: dict[Picture, DrawnLaw] = {
     ),
     Picture.GROWTH: DrawnLaw(
         TIME,
-        lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0 + term.values[2])),
+        lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0)),
         "growth of the screw",
         "m/m",
         channel=_table,
-        carrier=lambda d, view: _position(d, view) - view.term.values[2],
+        carrier=_position,
     ),
     Picture.MOTOR_READING: DrawnLaw(
         ANGLE,

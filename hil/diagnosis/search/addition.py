@@ -185,20 +185,14 @@ def torque_of(
 
     Without it is also the twin of the bench file, if `given`: a fit whose other parameters pay for a term is worse.
 
-    An error of the transmission is no torque on an axis without a spring, nor is a slope of the lead, a growing screw
-    or an error of the second encoder on any axis. An error of the motor's encoder is: a motion that is read late, or
-    wrong over the angle, needs another torque.
+    An error of the transmission is no torque on an axis without a spring, nor is an error of the second encoder on any
+    axis. One of the motor's encoder is: a motion that is read late, or wrong over the angle, needs another torque.
     """
     mechanism = BY_ID[term.effect]
     variant = mechanism.variants[term.variant]
     if mechanism.block is Block.CONTROLLER or (in_measured_torque(term) and variant.stage is not Stage.CHANNEL):
         return None
-    of_table = mechanism.search.needs_table and mechanism.search.proportional  # of the lead or of its growth
-    if (
-        reads_wrong(term, fit.bench)
-        or term.windows
-        or (mechanism.in_transmission and (of_table or not fit.bench.axis.SPRINGS))
-    ):
+    if reads_wrong(term, fit.bench) or term.windows or (mechanism.in_transmission and not fit.bench.axis.SPRINGS):
         return None
     left, other = torque_missed(fit, data), torque_missed(without, data)
     if left is None or other is None or not np.isfinite(other):  # the twin without it does not hold the motion

@@ -54,27 +54,10 @@ def test_cumulative_lead_error_grows_along_the_travel(angle, slope) -> None:
     assert ahead == pytest.approx(slope * RATIO_M * angle, rel=2e-3, abs=1e-12)
 
 
-def test_a_screw_grows_away_from_its_fixed_bearing() -> None:
-    def shift(angle: float) -> float:
-        values = {"relative_growth": 1e-4, "time_constant_s": 10.0, "fixed_bearing_m": 0.25}
-        return unloaded_table("thermal_growth", angle, time_s=500.0, **values) - RATIO_M * angle
-
-    assert shift(0.25 / RATIO_M) == pytest.approx(0.0, abs=1e-12)
-    assert shift(0.75 / RATIO_M) == pytest.approx(0.5e-4, rel=1e-3)
-    assert shift(0.0) == pytest.approx(-0.25e-4, rel=1e-3)
-
-
 @given(angle=st.floats(-600.0, 600.0), growth=st.floats(-1e-3, 1e-3), tau=st.floats(1.0, 1e4))
 def test_thermal_growth_starts_cold_and_settles(angle, growth, tau) -> None:
     cold, at_tau, warm = (
-        unloaded_table(
-            "thermal_growth",
-            angle,
-            time_s=multiple * tau,
-            relative_growth=growth,
-            time_constant_s=tau,
-            fixed_bearing_m=0.0,
-        )
+        unloaded_table("thermal_growth", angle, time_s=multiple * tau, relative_growth=growth, time_constant_s=tau)
         for multiple in (0.0, 1.0, 50.0)
     )
     assert cold == pytest.approx(RATIO_M * angle, abs=1e-12)

@@ -1,6 +1,6 @@
-"""Generalised least squares over the rows that count: a prediction-error filter that makes what is left white.
+"""Whitening for least squares: a filter that turns the residual into white noise.
 
-Slow errors, as of another friction, then hide no effect that is faster.
+A slow residual, such as that of a wrong friction law, then hides no faster effect.
 """
 
 from collections.abc import Sequence

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hil.diagnosis.preparation.split import whole_name
 from hil.diagnosis.statement import explained
-from hil.diagnosis.wording import named, parameter_of, spoken_key
+from hil.diagnosis.wording import named, parameter_of, spoken_key, whole_name
 from hil.figures.card import card
 from hil.quantities import digits, percent, with_error
 

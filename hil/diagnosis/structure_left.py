@@ -14,42 +14,19 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.questions import OFFSET, Question, everywhere, folded, over_time, strongest_line
 from hil.diagnosis.wording import by_chance
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.periods import strongest_periods
 from hil.identification.plain_model import PlainModel
-from hil.identification.structure import BINS, ResidualSeries, Structure, offset, slow, structure
+from hil.identification.structure import ResidualSeries, Structure, offset, slow, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
-_ROWS = 4.0  # per period of a line: less is an alias
-_MOST_PERIODS = 4000  # of a line over the travel
-_SEEN = 4.0  # bins of the position per period, from which they show it
-POSITION, SPEED, OFFSET = "position", "speed", "offset"
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
+_INERTIA = {"N m": "kg m^2", "N": "kg", "V": "V s^2/rad"}  # unit of a torque per acceleration
 _RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that shows it
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """A quantity (n,) of each run that a residual may depend on, in a unit.
-
-    `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
-    `by_direction` where the axis moves up. `kept`: it means the same in other recordings. `choices`: number of
-    quantities of which the residual itself chose this one.
-    """
-
-    name: str
-    unit: str
-    length: str
-    values: tuple[FloatArray, ...]
-    bins: int = BINS
-    by_direction: float = 0.0
-    least: float = 0.0
-    kept: bool = True
-    choices: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +60,10 @@ class Dependence:
         at = int(np.argmax(np.abs(found.means) / np.maximum(found.errors, 1e-300)))
         value, low, high = (float(one) for one in (found.means[at], found.edges[at], found.edges[at + 1]))
         more = "more" if value > 0.0 else "less"
-        if self.channel == TORQUE:
+        if question.accelerations:
+            inertia = quantity(abs(value), _INERTIA[drive_unit])
+            what = f"the axis accelerates as with {inertia} {more} inertia than the twin"
+        elif self.channel == TORQUE:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
         else:
             what = f"the second encoder reads {quantity(abs(value), question.length)} {more} than the twin"
@@ -114,7 +94,8 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    asked = len(channels(fit.data)) * (len(questions(fit.hypothesis, fit.data, plain)) + 1)  # a line is one more
+    same = len(everywhere(fit.hypothesis, fit.data, plain)) + 1  # a line is one more
+    asked = sum(same + len(over_time(channel == TORQUE, fit.hypothesis, fit.data)) for channel in channels(fit.data))
     level = CRITERIA.significance / max(asked, 1)
     counted = [
         one
@@ -141,66 +122,6 @@ def like_noise(fit: Fit, left: Sequence[Dependence]) -> frozenset[str]:
         for channel in channels(fit.data)
         if channel not in told and offset(left_in_channel(fit.hypothesis, fit.data, channel, plain)) is not None
     )
-
-
-def questions(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
-    """Quantities that a residual may depend on."""
-    motions = [measured_motion(run).moved for run in data.runs]
-    ratio = hypothesis.bench.axis.ratio_m_rad
-    position = tuple(ratio * moved.position for moved in motions)
-    low = min(float(one.min()) for one in position)
-    span = max(float(one.max()) for one in position) - low
-    length = "rad" if hypothesis.bench.axis.turns else "m"
-    begin = min(float(run.time_s[0]) for run in data.runs)
-    duration = max(float(run.time_s[-1]) for run in data.runs) - begin
-    up = [moved.velocity > 0.0 for moved in motions]
-    by_direction = tuple(one - low + 1.001 * span * moves for one, moves in zip(position, up, strict=True))
-    load = [plain.predict(moved) for moved in motions]
-    least = min(float(one.min()) for one in load)
-    range_ = 1.001 * (max(float(one.max()) for one in load) - least)
-    by_load = tuple(one - least + range_ * moves for one, moves in zip(load, up, strict=True))
-    later = tuple(run.time_s - begin + 1.001 * duration * moves for run, moves in zip(data.runs, up, strict=True))
-    return [
-        Question(POSITION, length, length, position),
-        Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
-        Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
-        # friction of a load has its sign
-        Question("load", hypothesis.bench.axis.drive_unit, length, by_load, 2 * BINS, range_, least),
-        Question("time", "s", length, later, 2 * BINS, 1.001 * duration, kept=False),
-    ]
-
-
-def _line(data: Dataset, parts: Sequence[ResidualSeries], asked: Sequence[Question]) -> tuple[float, int] | None:
-    """Period of the strongest line of a residual over the position, and of how many; None without one.
-
-    Periods are shorter than the bins of the position show, and longer than counts and rows make.
-    """
-    position, speed = (
-        np.concatenate([one[part.rows] for one, part in zip(question.values, parts, strict=True)])
-        for question in (_named(asked, POSITION), _named(asked, SPEED))
-    )
-    if not position.size:
-        return None
-    span = float(np.ptp(position))
-    run, ratio = data.runs[0], data.bench.axis.ratio_m_rad
-    counts = np.sqrt(12.0) * max(ratio * run.noise.motor, run.noise.table_m)
-    shortest = max(_ROWS * run.period_s * float(np.median(np.abs(speed))), _ROWS * float(counts), span / _MOST_PERIODS)
-    left = np.concatenate([part.left[part.rows] for part in parts])
-    found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest=_SEEN * span / BINS)
-    return (found[0], int(2.0 * span / shortest)) if found else None
-
-
-def _folded(question: Question, line: tuple[float, int], turn: float) -> Question:
-    """The position within a period; `turn` is that of the motor, 0 if it is not known."""
-    period, choices = line
-    often = f" ({digits(turn / period)} per motor turn)" if turn else ""
-    name = f"place within its period of {quantity(period, question.length)}{often}"
-    folded = tuple(np.mod(one, period) for one in question.values)
-    return replace(question, name=name, values=folded, choices=choices)
-
-
-def _named(asked: Sequence[Question], name: str) -> Question:
-    return next(one for one in asked if one.name == name)
 
 
 def channels(data: Dataset) -> list[str]:
@@ -246,24 +167,39 @@ def _dependences(
             constant.energy / least_energy(fit.data, channel, plain),
             gain,
         )
-    asked = questions(fit.hypothesis, fit.data, plain)
-    there_too = questions(fit.hypothesis, held_out, plain) if others else []
-    if line := _line(fit.data, parts, asked):
+    asked = everywhere(fit.hypothesis, fit.data, plain)
+    there_too = everywhere(fit.hypothesis, held_out, plain) if others else []
+    if line := strongest_line(fit.data, parts, asked):
         physics, ratio = fit.bench.axis.physics(), fit.bench.axis.ratio_m_rad
         turn = 2.0 * np.pi * ratio / physics.angle_per_unit if physics.turn_known else 0.0
-        asked.append(_folded(_named(asked, POSITION), line, turn))
-        there_too += [_folded(_named(there_too, POSITION), line, turn)] if there_too else []
+        asked.append(folded(asked, line, turn))
+        there_too += [folded(there_too, line, turn)] if there_too else []
     elsewhere = {one.name: one.values for one in there_too}
     for question in asked:
-        found = structure(parts, question.values, question.bins)
-        if found is None:
-            continue
-        if not question.kept:
-            found = replace(found, p=max(found.p, slow(parts, question.values, found)))
-        gain = None
-        if question.kept and question.name in elsewhere:
-            gain = _removed(found, others, elsewhere[question.name])
-        yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
+        if found := structure(parts, question.values, question.bins):
+            gain = _removed(found, others, elsewhere[question.name]) if question.name in elsewhere else None
+            yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
+    goes_on = _goes_on(fit.data, held_out)
+    whole = fit.data.over((*fit.data.runs, *held_out.runs)) if goes_on else fit.data
+    of_whole = [*parts, *others] if goes_on else parts
+    for question in over_time(channel == TORQUE, fit.hypothesis, whole):
+        of = question.asked_of(of_whole)
+        if found := structure(of, question.values, question.bins):
+            p = slow(of, question.values, found)  # an axis accelerates in bursts, and no autocovariance holds for these
+            found = replace(found, p=p if question.accelerations else max(found.p, p))
+            energy = found.energy * question.power(of_whole)
+            yield Dependence(channel, question, found, energy / total, energy / least, None)
+
+
+def _goes_on(train: Dataset, held_out: Dataset) -> bool:
+    """True if the held-out motion is at other times than that of training: a part of the same recordings."""
+    if not held_out.runs:
+        return False
+    (begin, end), (first, last) = (
+        (min(float(one[0]) for one in times), max(float(one[-1]) for one in times))
+        for times in ([run.time_s[run.evaluated] for run in data.runs] for data in (train, held_out))
+    )
+    return first >= end or last <= begin
 
 
 def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:

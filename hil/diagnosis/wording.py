@@ -12,6 +12,13 @@ from hil.quantities import digits, known_quantity, quantity, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
+FIRST_PART, LAST_PART = "first part", "last part"  # of a recording of which one is held out
+
+
+def whole_name(name: str) -> str:
+    """Name of the recording of which one with this name may be a part."""
+    return name.removesuffix(f" ({FIRST_PART})").removesuffix(f" ({LAST_PART})")
+
 
 def title(effect: str) -> str:
     """Replace the underscores of an id by spaces: "constant_load" -> "constant load"."""

@@ -17,8 +17,7 @@ import yaml
 from hil.bench.bench_file import Bench, load_bench
 from hil.bench.hardware import SimulationSection
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.preparation.split import whole_name
-from hil.diagnosis.wording import title
+from hil.diagnosis.wording import title, whole_name
 from hil.errors import InputError
 from hil.files.output import write_text
 from hil.files.yaml_edit import YamlChange, comment_lines, root_keys, with_changes, with_items, without_item

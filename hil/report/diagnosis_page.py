@@ -9,10 +9,9 @@ from hil.diagnosis.open_questions import no_experiment
 from hil.diagnosis.pictures.change import CAPTION
 from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
 from hil.diagnosis.pictures.structure import structure_figure
-from hil.diagnosis.preparation.split import whole_name
 from hil.diagnosis.result import AT_FLOOR, Verdict
 from hil.diagnosis.statement import explained
-from hil.diagnosis.wording import titles, where
+from hil.diagnosis.wording import titles, where, whole_name
 from hil.figures.drawing import save
 from hil.quantities import digits, percent, reading_unit
 from hil.report.findings_section import findings_section

@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.pictures.view import label_of_channel, torque_of, unit_of_channel
+from hil.diagnosis.wording import whole_name
 from hil.errors import InputError
 from hil.figures.drawing import WIDTH_IN, Drawing, legend_above, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, SIMULATED, thin
@@ -37,9 +38,9 @@ def change_figure(diagnosis: Diagnosis) -> Drawing:
         before = _residual(nominal.on(diagnosis.train.over([run])), channel)
         after = np.full(run.motor.size, np.nan)
         for part in change.parts:
-            (own,) = part.data.runs
-            if own.name == run.name:
-                after[: own.motor.size][own.evaluated] = _residual(part, channel)[own.evaluated]
+            for own in (one for one in part.data.runs if one.name == run.name):
+                left = _residual(part.on(part.data.over([own])), channel)
+                after[: own.motor.size][own.evaluated] = left[own.evaluated]
         drawn = run.evaluated
         time_s, lines = run.time_s[drawn], [before[drawn], after[drawn]]
         chosen = thin([np.nan_to_num(values) for values in lines], DRAWN_ROWS)
@@ -53,11 +54,10 @@ def change_figure(diagnosis: Diagnosis) -> Drawing:
             label="one set of parameters",
         )
         axis.plot(time_s[chosen], factor * lines[1][chosen], color=SIMULATED, linewidth=0.9, label="those of each part")
-        if change.summary.moment_s is not None:
-            axis.axvline(
-                change.summary.moment_s, color=DEVIATION, linewidth=1.4, label=f"{change.summary.moment_s:.2f} s"
-            )
-        style_axis(axis, f"{label_of_channel(diagnosis, channel)}\n[{unit}]", "time [s]", run.name)
+        moment_s = change.summary.moment_s if change.summary.recording == whole_name(run.name) else None
+        if moment_s is not None and time_s[0] <= moment_s <= time_s[-1]:
+            axis.axvline(moment_s, color=DEVIATION, linewidth=1.4, label=f"{moment_s:.2f} s")
+        style_axis(axis, f"{label_of_channel(diagnosis, channel)}\n[{unit}]", f"time of {run.name} [s]")
         legend_above(axis)
     return figure
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from hil.diagnosis.structure_left import OFFSET, TORQUE, Dependence
+from hil.diagnosis.questions import OFFSET
+from hil.diagnosis.structure_left import TORQUE, Dependence
 from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.quantities import reading_unit

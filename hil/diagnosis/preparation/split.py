@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
+from hil.diagnosis.wording import FIRST_PART, LAST_PART
 from hil.identification.measured import LEAD_IN
 from hil.recording.recording import Recording
 
@@ -15,15 +16,9 @@ from hil.recording.recording import Recording
 CUTS = ((2.0 / 3.0, True), (1.0 / 3.0, False), (0.5, True), (0.5, False))
 _COVERED = 0.8  # least top speed in training over that held out: beyond, friction and inertia would be extrapolated
 _BOTH_WAYS = 0.1  # of the travel, forwards and backwards: less tells no lost motion and no load from friction
-_FIRST, _LAST = "first part", "last part"
 _STARTED = 0.01  # of the travel: above noise and drift of an axis at rest
 _LONG_REST = 0.2  # of the recording: a third keeps less than half of its motion
 _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encoder
-
-
-def whole_name(name: str) -> str:
-    """Name of the recording of which one with this name may be a part."""
-    return name.removesuffix(f" ({_FIRST})").removesuffix(f" ({_LAST})")
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
@@ -49,7 +44,7 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
 def _cut(recording: Recording, row: int, last: bool) -> tuple[Recording, Recording]:
     """Return the part for training and the one held out, cut at rest near a row; `last`: the last one is held out."""
     cut = _standstill(recording, row)
-    parts = _part(recording, slice(0, cut), _FIRST), _part(recording, slice(cut, None), _LAST)
+    parts = _part(recording, slice(0, cut), FIRST_PART), _part(recording, slice(cut, None), LAST_PART)
     return parts if last else (parts[1], parts[0])
 
 
@@ -68,7 +63,7 @@ def _led_in(recording: Recording, part: Recording) -> Recording:
 
 def held_out_note(held_out: Sequence[Recording]) -> str:
     """Sentence on the parts that `split` holds out."""
-    first = [one.name for one in held_out if one.name.endswith(f"({_FIRST})")]
+    first = [one.name for one in held_out if one.name.endswith(f"({FIRST_PART})")]
     text = "No held-out recording was given: the last part of each recording is used for validation"
     return f"{text}, but {', '.join(first)}, since only the rest reaches the full speed." if first else f"{text}."
 

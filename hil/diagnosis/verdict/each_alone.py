@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import AxisChange, ChangedParameter
 from hil.diagnosis.value import Value
+from hil.diagnosis.wording import whole_name
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
@@ -47,6 +49,10 @@ def changed(nominal: Fit, held_out: Dataset) -> Change | None:
     runs = (*nominal.data.runs, *held_out.runs)
     alone = _each(nominal.data, runs)
     if len(runs) > 1 and all(fit.at_floor for fit in alone):
+        if (in_turn := _in_turn(runs)) and (
+            found := _changed_within(fit_nominal_parameters(nominal.data.over(in_turn)))
+        ):
+            return found
         names = tuple(run.name for run in runs)
         told = AxisChange(recording=None, moment_s=None, parts=names, parameters=_differing(alone))
         if told.parameters:
@@ -54,19 +60,36 @@ def changed(nominal: Fit, held_out: Dataset) -> Change | None:
     return next((found for fit in alone if not fit.at_floor and (found := _changed_within(fit))), None)
 
 
-def _changed_within(alone: Fit) -> Change | None:
-    """A change during the only recording of a fit that explains nearly all of its mismatch; else None."""
-    (run,) = alone.data.runs
-    row, settling = _moment(alone), round(SETTLE_IN_MOTION_S / run.period_s)
-    if row is None or row + settling >= run.motor.size:
+def _in_turn(runs: Sequence[Measured]) -> list[Measured]:
+    """The runs in order of time; none unless each ends before the next begins, as parts of one recording do."""
+    ordered = sorted(runs, key=lambda run: float(run.time_s[run.evaluated][0]))
+    apart = all(one.time_s[one.evaluated][-1] <= two.time_s[two.evaluated][0] for one, two in pairwise(ordered))
+    return ordered if apart else []
+
+
+def _changed_within(whole: Fit) -> Change | None:
+    """A change at a moment of a recording, or of its parts, that explains nearly all of a fit's mismatch; else None."""
+    runs, at = whole.data.runs, _moment(whole)
+    if at is None:
         return None
-    fits = _each(alone.data, [run.until(row), replace(run, lead_in=row + settling)])
-    left = sum(fit.excess for fit in fits) / alone.excess
+    number, row = at
+    cut = runs[number]
+    settled = row + round(SETTLE_IN_MOTION_S / cut.period_s)
+    before, after = [*runs[:number]], [*runs[number + 1 :]]
+    if row > cut.evaluated.indices(cut.motor.size)[0] + settled - row:
+        before.append(cut.until(row))
+    if settled < cut.motor.size:
+        after.insert(0, replace(cut, lead_in=settled))
+    if not before or not after:
+        return None
+    fits = [fit_nominal_parameters(whole.data.over(part)) for part in (before, after)]
+    left = sum(fit.excess for fit in fits) / whole.excess if whole.excess > 0.0 else 0.0
     found = _differing(fits)
     if left > 1.0 - CRITERIA.change or not found:
         return None
-    told = AxisChange(recording=run.name, moment_s=float(run.time_s[row]), parts=("before", "after"), parameters=found)
-    return Change(told, (run,), tuple(fits), left)
+    moment_s = float(cut.time_s[row])
+    told = AxisChange(recording=whole_name(cut.name), moment_s=moment_s, parts=("before", "after"), parameters=found)
+    return Change(told, runs, tuple(fits), left)
 
 
 def _each(data: Dataset, runs: Sequence[Measured]) -> list[Fit]:
@@ -90,24 +113,28 @@ def _differing(fits: Sequence[Fit]) -> tuple[ChangedParameter, ...]:
     return tuple(told)
 
 
-def _moment(alone: Fit) -> int | None:
-    """Row of the only run of a fit at which its parameters change most likely; None in a run that is too short.
+def _moment(whole: Fit) -> tuple[int, int] | None:
+    """Run and row at which the parameters of a fit change most likely; None in recordings that are too short.
 
     Two changes of the parameters, one for the rows before it and one for those after it, leave the smallest residuals
     there. Residuals are taken as linear in these changes.
     """
-    (run,) = alone.data.runs
-    parts = alone.residuals.split(np.column_stack([alone.jacobian, alone.residuals.vector]))
-    block = max(round(_BLOCK_S / run.period_s), 1)
-    rows = parts[0].shape[0] // block * block
-    table = np.concatenate([part[:rows].reshape(rows // block, block, -1) for part in parts], axis=1)
-    normal = np.einsum("bij,bik->bjk", table, table).cumsum(axis=0)
-    margin = max(round(_SHORTEST * len(normal)), 1)
-    cuts = range(margin, len(normal) - margin)
-    if not cuts or not alone.jacobian.shape[1]:
+    columns = whole.residuals.split(np.column_stack([whole.jacobian, whole.residuals.vector]))
+    products, rows = list[FloatArray](), list[tuple[int, int]]()
+    for number, run in enumerate(whole.data.runs):
+        own = [part for (of, _), part in zip(whole.residuals.parts, columns, strict=True) if of == number]
+        block = max(round(_BLOCK_S / run.period_s), 1)
+        count = own[0].shape[0] // block
+        table = np.concatenate([part[: count * block].reshape(count, block, -1) for part in own], axis=1)
+        products += list(np.einsum("bij,bik->bjk", table, table))
+        first = run.evaluated.indices(run.motor.size)[0]
+        rows += [(number, first + (one + 1) * block) for one in range(count)]
+    margin = max(round(_SHORTEST * len(rows)), 1)
+    cuts = range(margin, len(rows) - margin)
+    if not cuts or not whole.jacobian.shape[1]:
         return None
-    best = min(cuts, key=lambda cut: _left(normal[cut]) + _left(normal[-1] - normal[cut]))
-    return run.evaluated.indices(run.motor.size)[0] + (best + 1) * block
+    normal = np.cumsum(products, axis=0)
+    return rows[min(cuts, key=lambda cut: _left(normal[cut]) + _left(normal[-1] - normal[cut]))]
 
 
 def _left(normal: FloatArray) -> float:

@@ -54,7 +54,9 @@ def judge(tested: Tested) -> Judged:
         final = searched.given if as_given else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
-    left = structure_left(final, held_out)
+    of_parts = change.parts if change and change.explains_all else ()
+    left = tuple(one for part in of_parts for one in structure_left(part, part.data.over([])))
+    left = left if of_parts else structure_left(final, held_out)
     maps = () if change else unnamed_terms(final, left, held_out)
     return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left, maps)
 

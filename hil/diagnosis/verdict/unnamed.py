@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hil.diagnosis.structure_left import DIFFERENCE, POSITION, SPEED, TORQUE, Dependence
+from hil.diagnosis.questions import POSITION, SPEED
+from hil.diagnosis.structure_left import DIFFERENCE, TORQUE, Dependence
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.structure import Structure

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hil.diagnosis.structure_left import TORQUE, Dependence, Question
+from hil.diagnosis.questions import Question
+from hil.diagnosis.structure_left import TORQUE, Dependence
 from hil.identification.structure import Structure
 
 
@@ -19,7 +20,7 @@ from hil.identification.structure import Structure
     ],
 )
 def test_a_range_lies_within_one_direction(low: float, high: float, said: str) -> None:
-    question = Question("time", "s", "m", (), by_direction=10.0, kept=False)
+    question = Question("time", "s", "m", (), by_direction=10.0)
     found = Structure(np.array([low, high]), np.array([0.2]), np.array([0.01]), 0.04, 1e-6)
     text = Dependence(TORQUE, question, found, 0.5, 2.0, None).in_words("N m")
     assert text.startswith("the axis needs 0.200 N m more torque than the twin")

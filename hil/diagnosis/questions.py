@@ -1,0 +1,128 @@
+"""Quantities over which the residual of a twin is asked for structure, and what of it is asked."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.identification.dataset import Dataset
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.periods import strongest_periods
+from hil.identification.plain_model import PlainModel
+from hil.identification.structure import BINS, ResidualSeries
+from hil.identification.torque_left import measured_motion
+from hil.quantities import digits, quantity
+
+_ROWS = 4.0  # per period of a line: less is an alias
+_MOST_PERIODS = 4000  # of a line over the travel
+_SEEN = 4.0  # bins of the position per period, from which they show it
+POSITION, SPEED, OFFSET = "position", "speed", "offset"
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A quantity (n,) of each run that a residual may depend on, in a unit.
+
+    `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
+    `by_direction` where the axis moves up. `choices`: number of quantities of which the residual itself chose this one.
+    `accelerations` (n,): asked is the residual per acceleration, an inertia.
+    """
+
+    name: str
+    unit: str
+    length: str
+    values: tuple[FloatArray, ...]
+    bins: int = BINS
+    by_direction: float = 0.0
+    least: float = 0.0
+    choices: int = 1
+    accelerations: tuple[FloatArray, ...] = ()
+
+    def asked_of(self, parts: Sequence[ResidualSeries]) -> list[ResidualSeries]:
+        """What the question is asked of: residuals as they are, or per acceleration, by least squares in each row."""
+        if not self.accelerations:
+            return list(parts)
+        power = self.power(parts)
+        return [
+            part._replace(left=part.left * one / power) for part, one in zip(parts, self.accelerations, strict=True)
+        ]
+
+    def power(self, parts: Sequence[ResidualSeries]) -> float:
+        """Mean square of a residual that is 1 in what the question is asked of."""
+        if not self.accelerations:
+            return 1.0
+        rows = [one[part.rows] for part, one in zip(parts, self.accelerations, strict=True)]
+        return max(float(np.mean(np.concatenate(rows) ** 2)), 1e-300)
+
+
+def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
+    """Quantities that mean the same in every recording."""
+    motions = [measured_motion(run).moved for run in data.runs]
+    ratio = hypothesis.bench.axis.ratio_m_rad
+    position = tuple(ratio * moved.position for moved in motions)
+    low = min(float(one.min()) for one in position)
+    span = max(float(one.max()) for one in position) - low
+    length = "rad" if hypothesis.bench.axis.turns else "m"
+    up = [moved.velocity > 0.0 for moved in motions]
+    by_direction = tuple(one - low + 1.001 * span * moves for one, moves in zip(position, up, strict=True))
+    load = [plain.predict(moved) for moved in motions]
+    least = min(float(one.min()) for one in load)
+    range_ = 1.001 * (max(float(one.max()) for one in load) - least)
+    by_load = tuple(one - least + range_ * moves for one, moves in zip(load, up, strict=True))
+    return [
+        Question(POSITION, length, length, position),
+        Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
+        Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
+        # friction of a load has its sign
+        Question("load", hypothesis.bench.axis.drive_unit, length, by_load, 2 * BINS, range_, least),
+    ]
+
+
+def over_time(of_torque: bool, hypothesis: Hypothesis, data: Dataset) -> list[Question]:
+    """Time, by direction, as friction changes; and of the torque per acceleration, as a load changes."""
+    motions = [measured_motion(run).moved for run in data.runs]
+    length = "rad" if hypothesis.bench.axis.turns else "m"
+    begin = min(float(run.time_s[0]) for run in data.runs)
+    since = [run.time_s - begin for run in data.runs]
+    duration = 1.001 * max(float(one[-1]) for one in since)
+    later = tuple(one + duration * (moved.velocity > 0.0) for one, moved in zip(since, motions, strict=True))
+    asked = [Question("time", "s", length, later, 2 * BINS, duration)]
+    if of_torque:
+        accelerations = tuple(moved.acceleration for moved in motions)
+        asked.append(Question("time", "s", length, tuple(since), accelerations=accelerations))
+    return asked
+
+
+def strongest_line(
+    data: Dataset, parts: Sequence[ResidualSeries], asked: Sequence[Question]
+) -> tuple[float, int] | None:
+    """Period of the strongest line of a residual over the position, and of how many; None without one.
+
+    Periods are shorter than the bins of the position show, and longer than counts and rows make.
+    """
+    position, speed = (
+        np.concatenate([one[part.rows] for one, part in zip(question.values, parts, strict=True)])
+        for question in (_named(asked, POSITION), _named(asked, SPEED))
+    )
+    if not position.size:
+        return None
+    span = float(np.ptp(position))
+    run, ratio = data.runs[0], data.bench.axis.ratio_m_rad
+    counts = np.sqrt(12.0) * max(ratio * run.noise.motor, run.noise.table_m)
+    shortest = max(_ROWS * run.period_s * float(np.median(np.abs(speed))), _ROWS * float(counts), span / _MOST_PERIODS)
+    left = np.concatenate([part.left[part.rows] for part in parts])
+    found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest=_SEEN * span / BINS)
+    return (found[0], int(2.0 * span / shortest)) if found else None
+
+
+def folded(asked: Sequence[Question], line: tuple[float, int], turn: float) -> Question:
+    """The position within a period; `turn` is that of the motor, 0 if it is not known."""
+    (period, choices), position = line, _named(asked, POSITION)
+    often = f" ({digits(turn / period)} per motor turn)" if turn else ""
+    name = f"place within its period of {quantity(period, position.length)}{often}"
+    return replace(position, name=name, values=tuple(np.mod(one, period) for one in position.values), choices=choices)
+
+
+def _named(asked: Sequence[Question], name: str) -> Question:
+    return next(one for one in asked if one.name == name)

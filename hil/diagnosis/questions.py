@@ -2,14 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.moment_of_change import MomentOfChange, moment_of_change
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import Measured
 from hil.identification.periods import strongest_periods
-from hil.identification.plain_model import PlainModel
+from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import BINS, ResidualSeries
 from hil.identification.torque_left import measured_motion
 from hil.quantities import digits, quantity
@@ -26,7 +29,7 @@ class Question:
 
     `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
     `by_direction` where the axis moves up. `choices`: number of quantities of which the residual itself chose this one.
-    `accelerations` (n,): asked is the residual per acceleration, an inertia.
+    `change`: asked is from which moment on a coefficient of the plain model is another one.
     """
 
     name: str
@@ -37,23 +40,7 @@ class Question:
     by_direction: float = 0.0
     least: float = 0.0
     choices: int = 1
-    accelerations: tuple[FloatArray, ...] = ()
-
-    def asked_of(self, parts: Sequence[ResidualSeries]) -> list[ResidualSeries]:
-        """What the question is asked of: residuals as they are, or per acceleration, by least squares in each row."""
-        if not self.accelerations:
-            return list(parts)
-        power = self.power(parts)
-        return [
-            part._replace(left=part.left * one / power) for part, one in zip(parts, self.accelerations, strict=True)
-        ]
-
-    def power(self, parts: Sequence[ResidualSeries]) -> float:
-        """Mean square of a residual that is 1 in what the question is asked of."""
-        if not self.accelerations:
-            return 1.0
-        rows = [one[part.rows] for part, one in zip(parts, self.accelerations, strict=True)]
-        return max(float(np.mean(np.concatenate(rows) ** 2)), 1e-300)
+    change: MomentOfChange | None = None
 
 
 def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
@@ -79,19 +66,29 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
     ]
 
 
-def over_time(of_torque: bool, hypothesis: Hypothesis, data: Dataset) -> list[Question]:
-    """Time, by direction, as friction changes; and of the torque per acceleration, as a load changes."""
-    motions = [measured_motion(run).moved for run in data.runs]
+def in_turn(runs: Sequence[Measured]) -> list[Measured]:
+    """The runs in order of time; none unless each ends before the next begins, as parts of one recording do."""
+    ordered = sorted(runs, key=lambda run: float(run.time_s[run.evaluated][0]))
+    apart = all(one.time_s[one.evaluated][-1] <= two.time_s[two.evaluated][0] for one, two in pairwise(ordered))
+    return ordered if apart else []
+
+
+def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
+    """Time, by direction, as friction changes."""
     length = "rad" if hypothesis.bench.axis.turns else "m"
     begin = min(float(run.time_s[0]) for run in data.runs)
     since = [run.time_s - begin for run in data.runs]
     duration = 1.001 * max(float(one[-1]) for one in since)
-    later = tuple(one + duration * (moved.velocity > 0.0) for one, moved in zip(since, motions, strict=True))
-    asked = [Question("time", "s", length, later, 2 * BINS, duration)]
-    if of_torque:
-        accelerations = tuple(moved.acceleration for moved in motions)
-        asked.append(Question("time", "s", length, tuple(since), accelerations=accelerations))
-    return asked
+    up = [measured_motion(run).moved.velocity > 0.0 for run in data.runs]
+    later = tuple(one + duration * moves for one, moves in zip(since, up, strict=True))
+    return Question("time", "s", length, later, 2 * BINS, duration)
+
+
+def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
+    """The moment from which a coefficient of the plain model is another one; None where the rows do not tell one."""
+    columns = [plain_columns(measured_motion(run).moved, plain.load_ratio) for run in data.runs]
+    found = moment_of_change(parts, columns, [run.time_s for run in data.runs])
+    return Question("time", "s", "", (), change=found) if found else None
 
 
 def strongest_line(

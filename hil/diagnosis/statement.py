@@ -9,7 +9,7 @@ from hil.diagnosis.ledger import EXPLAINS
 from hil.diagnosis.open_questions import cannot_show
 from hil.diagnosis.result import AT_FLOOR, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
-from hil.diagnosis.wording import listed, named, titles
+from hil.diagnosis.wording import listed, named, spoken, titles
 from hil.identification.least_squares import SIGMAS
 from hil.quantities import percent, quantity
 
@@ -89,7 +89,7 @@ def _of_axis(change: AxisChange, result: Result) -> str:
     if change.moment_s is not None:
         where, parts = f"at {change.moment_s:.2f} s of {change.recording}", list(change.parts)
     told = "; ".join(
-        f"{one.name} "
+        f"{spoken(one.name.rpartition('.')[2])} "
         + ", ".join(
             f"{quantity(entry.value, entry.unit)} {part}" for entry, part in zip(one.values, parts, strict=True)
         )

@@ -14,7 +14,17 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.questions import OFFSET, Question, everywhere, folded, over_time, strongest_line
+from hil.diagnosis.moment_of_change import MomentOfChange
+from hil.diagnosis.questions import (
+    OFFSET,
+    Question,
+    at_a_moment,
+    everywhere,
+    folded,
+    in_turn,
+    over_time,
+    strongest_line,
+)
 from hil.diagnosis.wording import by_chance
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -25,7 +35,15 @@ from hil.identification.torque_left import fit_plain, measured_motion, needed_to
 from hil.quantities import digits, quantity, reading_unit
 
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
-_INERTIA = {"N m": "kg m^2", "N": "kg", "V": "V s^2/rad"}  # unit of a torque per acceleration
+# Coefficients of the plain model, and their units on axes whose torque is in N m, N, or V.
+_COEFFICIENTS = {
+    "inertia": ("the inertia", {"N m": "kg m^2", "N": "kg", "V": "V s^2/rad"}),
+    "viscous": ("the viscous friction", {"N m": "N m s/rad", "N": "N s/m", "V": "V s/rad"}),
+    "coulomb": ("the Coulomb friction", {}),
+    "offset": ("the load", {}),
+    "sine": ("the torque over the sine of the angle", {}),
+    "cosine": ("the torque over the cosine of the angle", {}),
+}
 _RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that shows it
 
 
@@ -60,10 +78,9 @@ class Dependence:
         at = int(np.argmax(np.abs(found.means) / np.maximum(found.errors, 1e-300)))
         value, low, high = (float(one) for one in (found.means[at], found.edges[at], found.edges[at + 1]))
         more = "more" if value > 0.0 else "less"
-        if question.accelerations:
-            inertia = quantity(abs(value), _INERTIA[drive_unit])
-            what = f"the axis accelerates as with {inertia} {more} inertia than the twin"
-        elif self.channel == TORQUE:
+        if question.change:
+            return f"{_changed(question.change, drive_unit)} ({by_chance(found.p)})"
+        if self.channel == TORQUE:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
         else:
             what = f"the second encoder reads {quantity(abs(value), question.length)} {more} than the twin"
@@ -82,6 +99,14 @@ class Dependence:
         )
 
 
+def _changed(change: MomentOfChange, drive_unit: str) -> str:
+    """Say from which moment on which coefficient is larger or smaller."""
+    name, units = _COEFFICIENTS[change.coefficient]
+    size = quantity(abs(change.change), units.get(drive_unit, drive_unit))
+    more = "larger" if change.change > 0.0 else "smaller"
+    return f"from {change.moment_s:.2f} s on {name} is {size} {more} than before"
+
+
 def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
     """Dependences of what a fit leaves in training, the one with most energy first; none is no structure."""
     plain = fit_plain(fit.data)
@@ -94,8 +119,7 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    same = len(everywhere(fit.hypothesis, fit.data, plain)) + 1  # a line is one more
-    asked = sum(same + len(over_time(channel == TORQUE, fit.hypothesis, fit.data)) for channel in channels(fit.data))
+    asked = len(channels(fit.data)) * (len(everywhere(fit.hypothesis, fit.data, plain)) + 3)  # a line, time, a moment
     level = CRITERIA.significance / max(asked, 1)
     counted = [
         one
@@ -179,27 +203,16 @@ def _dependences(
         if found := structure(parts, question.values, question.bins):
             gain = _removed(found, others, elsewhere[question.name]) if question.name in elsewhere else None
             yield Dependence(channel, question, found, found.energy / total, found.energy / least, gain)
-    goes_on = _goes_on(fit.data, held_out)
-    whole = fit.data.over((*fit.data.runs, *held_out.runs)) if goes_on else fit.data
-    of_whole = [*parts, *others] if goes_on else parts
-    for question in over_time(channel == TORQUE, fit.hypothesis, whole):
-        of = question.asked_of(of_whole)
-        if found := structure(of, question.values, question.bins):
-            p = slow(of, question.values, found)  # an axis accelerates in bursts, and no autocovariance holds for these
-            found = replace(found, p=p if question.accelerations else max(found.p, p))
-            energy = found.energy * question.power(of_whole)
-            yield Dependence(channel, question, found, energy / total, energy / least, None)
-
-
-def _goes_on(train: Dataset, held_out: Dataset) -> bool:
-    """True if the held-out motion is at other times than that of training: a part of the same recordings."""
-    if not held_out.runs:
-        return False
-    (begin, end), (first, last) = (
-        (min(float(one[0]) for one in times), max(float(one[-1]) for one in times))
-        for times in ([run.time_s[run.evaluated] for run in data.runs] for data in (train, held_out))
-    )
-    return first >= end or last <= begin
+    runs = (*fit.data.runs, *held_out.runs)
+    one_way = bool(in_turn(runs))  # parts of a recording: its time goes on
+    whole, of_whole = (fit.data.over(runs), [*parts, *others]) if one_way else (fit.data, parts)
+    question = over_time(fit.hypothesis, whole)
+    if found := structure(of_whole, question.values, question.bins):
+        found = replace(found, p=max(found.p, slow(of_whole, question.values, found)))
+        yield Dependence(channel, question, found, found.energy / total, found.energy / least, None)
+    if channel == TORQUE and one_way and (at := at_a_moment(whole, of_whole, plain)) and at.change:
+        found = at.change.course
+        yield Dependence(channel, at, found, found.energy / total, found.energy / least, None)
 
 
 def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:

@@ -31,9 +31,8 @@ def titles(effects: Iterable[str]) -> str:
 
 
 def spoken(channel: str) -> str:
-    """Name of a recorded channel in words, without its unit: "motor_position_rad" -> "motor position"."""
-    unit = unit_of(channel)
-    ending = next((one for one in (unit.replace(" ", "_").lower(),) if channel.endswith(f"_{one}")), "")
+    """Name of a channel or a parameter in words, without its unit: "motor_position_rad" -> "motor position"."""
+    ending = unit_of(channel).replace("^", "").replace("/", "_").replace(" ", "_").lower()
     return title(channel.removesuffix(f"_{ending}"))
 
 

@@ -122,7 +122,7 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> l
     for run in data.runs:
         motion = measured_motion(run)
         rows = motion.sliding(plain.slowest)
-        found.append(ResidualSeries(_lacking(hypothesis, run, data.observer_s, motion, rows), rows))
+        found.append(ResidualSeries(-_lacking(hypothesis, run, data.observer_s, motion, rows), rows))
     return found
 
 

@@ -18,6 +18,7 @@ from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of,
 from hil.importing.row_counters import COUNTER, rises_evenly
 from hil.importing.two_encoders import follows_steps, motors_encoder, named_encoders
 from hil.importing.unnamed_columns import quantities_by_relations
+from hil.quantities import UNITS
 
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 _ALONE = "a set-point of the velocity; the control law is read from set-points of the position"
@@ -165,7 +166,7 @@ def _positions(
     if efforts and not commands and len(measured) > 1:
         encoders = named_encoders(measured, labels)
         told = [name for name in measured if labels[name].motor or labels[name].table or labels[name].measured]
-        plain = [name for name in measured if name not in (*told, *encoders)]
+        plain = [name for name in measured if name not in (*told, *encoders) and not _turns(name, measured, labels)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
         if not commands and len(measured) == 2 and plain and not told:
             driving = [live[name] for name in efforts]
@@ -212,6 +213,13 @@ def _positions(
             roles.unsure.append(f"{best}: {roles.motor} does not follow it (share {shares[best]:.2f}); it is not used")
         else:
             roles.command = roles.left_out.pop(best, None) and best
+
+
+def _turns(name: str, positions: list[str], labels: dict[str, Label]) -> bool:
+    """True of an angle beside lengths: a set-point is in the unit of the axis, the motor's encoder turns."""
+    kinds = {one: UNITS[labels[one].unit or ""][0] for one in positions if labels[one].unit in UNITS}
+    others = [kinds.get(one) for one in positions if one != name]
+    return kinds.get(name) == "rad" and all(one == "m" for one in others)
 
 
 def _copies(first: FloatArray, second: FloatArray) -> bool:

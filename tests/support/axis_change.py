@@ -27,7 +27,7 @@ def assert_change_is_told(folder: Path, at: int) -> None:
     result = found.result
     assert result.verdict == "axis_changed"
     assert result.change is not None
-    assert result.statement.startswith(f"The axis changed at {result.change.moment_s:.2f} s of log (")
+    assert result.statement.startswith(f"The axis changed at {result.change.moment_s:.2f} s of log: ")
     assert result.unexplained.share < 0.01
     assert not result.parameter_corrections  # none holds throughout
     write_diagnosis(found, folder)

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.questions import in_turn
 from hil.diagnosis.result import AxisChange, ChangedParameter
 from hil.diagnosis.value import Value
 from hil.diagnosis.wording import whole_name
@@ -49,22 +49,14 @@ def changed(nominal: Fit, held_out: Dataset) -> Change | None:
     runs = (*nominal.data.runs, *held_out.runs)
     alone = _each(nominal.data, runs)
     if len(runs) > 1 and all(fit.at_floor for fit in alone):
-        if (in_turn := _in_turn(runs)) and (
-            found := _changed_within(fit_nominal_parameters(nominal.data.over(in_turn)))
-        ):
+        ordered = in_turn(runs)
+        if ordered and (found := _changed_within(fit_nominal_parameters(nominal.data.over(ordered)))):
             return found
         names = tuple(run.name for run in runs)
         told = AxisChange(recording=None, moment_s=None, parts=names, parameters=_differing(alone))
         if told.parameters:
             return Change(told, runs, tuple(alone), 0.0)
     return next((found for fit in alone if not fit.at_floor and (found := _changed_within(fit))), None)
-
-
-def _in_turn(runs: Sequence[Measured]) -> list[Measured]:
-    """The runs in order of time; none unless each ends before the next begins, as parts of one recording do."""
-    ordered = sorted(runs, key=lambda run: float(run.time_s[run.evaluated][0]))
-    apart = all(one.time_s[one.evaluated][-1] <= two.time_s[two.evaluated][0] for one, two in pairwise(ordered))
-    return ordered if apart else []
 
 
 def _changed_within(whole: Fit) -> Change | None:

@@ -19,7 +19,7 @@ from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain
-from hil.identification.torque_left import mismatch_left
+from hil.identification.torque_left import fit_plain, mismatch_left, needed_torque
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,11 @@ def judge(tested: Tested) -> Judged:
     searched, final, refit = tested.searched, tested.proof.final, tested.refit
     held_out, law = searched.prepared.held_out, searched.prepared.law
     of_plant, change = verdict_on_plant(searched.given, searched.nominal, final, held_out), None
-    if of_plant is Verdict.UNEXPLAINED and not searched.stopped_at:
+    moves = final.terms and any(one.question.change for one in structure_left(final, held_out))  # beside all names
+    if (of_plant is Verdict.UNEXPLAINED or moves) and not searched.stopped_at:
         change = _better(changed(refit.fit, held_out), searched.nominal, final, held_out)
+    if change and of_plant is Verdict.MISSING_PHYSICS and not _needs_less_torque(change, final, held_out):
+        change = None
     if change and change.explains_all:
         of_plant = Verdict.AXIS_CHANGED
     verdict = law.verdict(of_plant)
@@ -126,6 +129,20 @@ def told_apart(nominal: Fit) -> bool:
         return True
     changed = corrections(nominal.bench, nominal).values()
     return any(abs(one.value - one.nominal) > CRITERIA.sigmas * one.std for one in changed)
+
+
+def _needs_less_torque(change: Change, named: Fit, held_out: Dataset) -> bool:
+    """True if parameters of each part leave less torque than the names do."""
+    plain = fit_plain(named.data)
+    if plain is None or not change.explains_all:
+        return False
+    whole = [(named.hypothesis, data) for data in (named.data, held_out) if data.runs]
+    parts = [(part.hypothesis, part.data) for part in change.parts]
+    left, less = (
+        np.concatenate([one.left[one.rows] for twin, data in twins for one in needed_torque(twin, data, plain)])
+        for twins in (whole, parts)
+    )
+    return bool(np.mean(less**2) < np.mean(left**2))
 
 
 def _better(change: Change | None, nominal: Fit, final: Fit, held_out: Dataset) -> Change | None:

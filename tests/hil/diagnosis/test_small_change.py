@@ -1,0 +1,58 @@
+"""A change below the noise of a row: from which moment on the axis is another one, by all rows together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import COULOMB_N_M, INERTIA_KG_M2, axis, renamed, write
+
+from hil.bench.bench_file import load_bench
+from hil.commands.identify import identify
+from hil.commands.import_ import import_
+from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.structure_left import TORQUE, structure_left
+from hil.explanation import explain
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.recording.recording import read_recording
+
+ROWS, AT = 9000, 4000
+HEAVIER, NOISE_N_M = 1.08, 0.08
+
+
+def recorded(folder: Path, inertia: np.ndarray, friction_n_m: np.ndarray) -> Path:
+    columns = axis(ROWS, inertia_kg_m2=inertia)
+    columns["torque"] += (friction_n_m - COULOMB_N_M) * np.sign(columns["speed"])
+    columns["torque"] += np.random.default_rng(5).normal(0.0, NOISE_N_M, ROWS)
+    return write(folder / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
+
+
+def test_a_load_that_is_put_on_is_told_with_its_moment(tmp_path: Path) -> None:
+    heavier = np.where(np.arange(ROWS) < AT, 1.0, HEAVIER) * INERTIA_KG_M2
+    found = explain([recorded(tmp_path, heavier, np.full(ROWS, COULOMB_N_M))], tmp_path / "out").diagnosis
+    change = found.result.change
+    assert found.result.verdict == "axis_changed"
+    assert change is not None
+    assert change.moment_s == pytest.approx(1e-3 * AT, abs=0.3)
+    assert found.result.statement.startswith(f"The axis changed at {change.moment_s:.2f} s of log: inertia ")
+    (inertia,) = (one for one in change.parameters if one.name == "inertia_kg_m2")
+    assert inertia.values[1].value / inertia.values[0].value == pytest.approx(HEAVIER, abs=0.02)
+    found.plot("change")
+
+
+def test_the_sign_of_a_structure_is_that_of_the_torque_that_the_axis_needs(tmp_path: Path) -> None:
+    """More friction in the last quarter: there the torque needed beyond the twin's has the sign of the motion."""
+    more = np.where(np.arange(ROWS) < 3 * ROWS // 4, 1.0, 1.5) * COULOMB_N_M
+    import_(recorded(tmp_path, np.full(ROWS, INERTIA_KG_M2), more), None, tmp_path / "log.parquet", None, None)
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    fit = fit_nominal_parameters(prepared.train)
+    plain = fit_plain(fit.data)
+    assert plain is not None
+    (run,), (left,) = prepared.held_out.runs, needed_torque(fit.hypothesis, prepared.held_out, plain)
+    way = measured_motion(run).moved.direction[left.rows]
+    assert float(np.mean(left.left[left.rows] * way)) > 0.1 * COULOMB_N_M
+    told = [one.in_words("N m") for one in structure_left(fit, prepared.held_out) if one.channel == TORQUE]
+    assert any("the Coulomb friction is" in one and "larger than before" in one for one in told)

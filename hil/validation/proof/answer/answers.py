@@ -49,7 +49,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer. `over_floor`: residual over noise floor on held-out recordings, in the worst channel."""
+    """An answer. `over_floor`: residual over noise, held out, in the worst channel; `moment_s`: of a change."""
 
     verdict: str
     named: tuple[Named, ...] = ()
@@ -59,6 +59,7 @@ class Answer:
     over_floor: float | None = None
     runtime_s: float | None = None
     statement: str = ""
+    moment_s: float | None = None
 
 
 def read_answers(folder: Path, names: Iterable[str]) -> dict[str, Answer]:
@@ -86,6 +87,7 @@ def parse_answer(data: dict[str, Any]) -> Answer:
         over_floor=_over_floor(data.get("fit", {})),
         runtime_s=data.get("runtime_s"),
         statement=data.get("statement", ""),
+        moment_s=(data.get("change") or {}).get("moment_s"),
     )
 
 

@@ -37,7 +37,7 @@ class RealTruth:
     the library, empty for another shape. size: strength over the standard error of least squares with the true shape.
     right: ids that are right. shape_missing: the library lacks the shape, so that no name is right; nor is one of rows
     that are lost or of another torque constant, where nothing is missing. compared: true values of parameters; adds:
-    an effect that is there already adds to them.
+    an effect that is there already adds to them. moment_s, duration_s: of a change of the axis, and of the half.
     """
 
     name: str
@@ -53,6 +53,8 @@ class RealTruth:
     shape_missing: bool = False
     compared: Mapping[str, float] = field(default_factory=dict)
     adds: bool = False
+    moment_s: float | None = None
+    duration_s: float = 0.0
 
     @property
     def half(self) -> tuple[str, int, bool]:
@@ -180,6 +182,8 @@ def _truth(half: Half, kind: str, edit: Edit | None = None, strength: float = 0.
         shape_missing=mechanism is None and not edit.error,
         compared=edit.compared(strength),
         adds=edit.adds,
+        moment_s=None if edit.moment_s is None else half.recording.start_s + edit.moment_s,
+        duration_s=float(half.time_s[-1]),
     )
 
 

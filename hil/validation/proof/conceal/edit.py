@@ -26,7 +26,8 @@ class Edit:
     the axis has. rivals: other effects that these channels cannot separate from it. instead: regressor of the plain
     model that is the same shape. adds: an effect of the same kind that is there already adds to it. whole: strength
     that is a whole row, of a channel that is late. error: standard error of the strength where least squares cannot
-    tell the shape, since parameters of the bench explain it: no name is right.
+    tell the shape, since parameters of the bench explain it: no name is right. moment_s: row time from which the axis
+    is another one; no name is right, the answer is the moment.
     """
 
     channel: EditedChannel
@@ -42,6 +43,7 @@ class Edit:
     adds: bool = False
     whole: float = 0.0
     error: float = 0.0
+    moment_s: float | None = None
 
     @property
     def shape(self) -> FloatArray:

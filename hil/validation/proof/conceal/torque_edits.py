@@ -34,6 +34,7 @@ _ORDERS = (4, 6, 8, 12, 18, 24, 36)  # of motors with 2 to 6 pole pairs
 _HIGHEST = 2.0  # of the Coulomb friction: in a zone
 _STEEPEST_M = 1e-3  # flank of a zone
 _COMPRESSED = 0.5  # of the largest torque: level above which the measured torque is too small
+_MOMENTS = (0.25, 0.75)  # shares of the half between which a change lies
 _SATURATED = 0.25  # of the largest torque: torque per ampere that is lost there
 
 
@@ -180,6 +181,19 @@ def _ramp(half: Half, rng: Rng) -> Edit:
     return _added(half, half.time_s / half.time_s[-1], None, signed=True)
 
 
+def _from_a_moment(half: Half, rng: Rng, shape: FloatArray) -> Edit:
+    moment_s = float(half.time_s[-1] * rng.uniform(*_MOMENTS))
+    return _added(half, shape * (half.time_s >= moment_s), None, signed=True, moment_s=moment_s)
+
+
+def _load_changes(half: Half, rng: Rng) -> Edit | None:
+    return _from_a_moment(half, rng, half.moved.acceleration) if half.plain["inertia"].significant else None
+
+
+def _friction_changes(half: Half, rng: Rng) -> Edit | None:
+    return _from_a_moment(half, rng, half.moved.direction) if half.plain["coulomb"].significant else None
+
+
 def _other_constant(half: Half, rng: Rng) -> Edit | None:
     torque, inertia = half.torque, half.plain["inertia"]
     if not inertia.significant:
@@ -204,4 +218,6 @@ TORQUE_EDITS: Mapping[str, Drawn] = {
     "friction by load": _by_load,
     "ramp": _ramp,
     "another torque constant": _other_constant,
+    "load from a moment on": _load_changes,
+    "friction from a moment on": _friction_changes,
 }

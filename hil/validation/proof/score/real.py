@@ -19,6 +19,7 @@ from hil.validation.proof.score.statistics import Rate, confidence_bins, expecte
 
 TOLD = 5.0  # standard errors of least squares from which the diagnosis should name an effect
 SURE, LIKELY = 0.9, 0.5  # confidence of a name
+_SOON = 0.1  # of a half: largest difference of two moments that are one
 _NEAR = 0.1  # relative difference of two periods, orders or frequencies that are one
 
 
@@ -67,6 +68,13 @@ class RealCaseScore:
         """True if the answer has a new name, or says that something is missing where it did not before."""
         verdicts = ("missing_physics", "unexplained", "axis_changed")
         return bool(self.new) or (self.answer.verdict in verdicts and self.untouched.verdict not in verdicts)
+
+    @property
+    def moment_told(self) -> bool:
+        """True if the answer is a change of the axis, near the moment of the concealed one."""
+        told, true = self.answer.moment_s, self.truth.moment_s
+        near = told is not None and true is not None and abs(told - true) <= _SOON * self.truth.duration_s
+        return near and self.answer.verdict == "axis_changed"
 
     def right(self, named: Named) -> bool:
         """Return whether a new name is right, by itself or by an equivalent that the diagnosis gives beside it."""
@@ -171,6 +179,7 @@ def _goals(cases: Sequence[RealCaseScore]) -> list[Goal]:
     concealed = [case for case in cases if case.truth.right]
     named = [case for case in concealed if not case.there_already]
     told = [case for case in named if case.truth.size >= TOLD]
+    moved = [case for case in cases if case.truth.moment_s is not None and case.truth.size >= TOLD]
     unknown = [case for case in cases if case.truth.shape_missing]
     harmless = [case for case in cases if not (case.null or case.truth.right or case.truth.shape_missing)]
     edited = [case for case in cases if not case.null]
@@ -189,6 +198,7 @@ def _goals(cases: Sequence[RealCaseScore]) -> list[Goal]:
         Goal(f"wrong name above {LIKELY}", rate(case.wrong_above(LIKELY) for case in edited), high=0.05),
         Goal("no name for it: something named", rate(bool(case.new) or case.unanswered for case in unknown)),
         Goal("no name for it: detected", rate(case.detected for case in unknown)),
+        Goal(f"changes told by {TOLD:g} errors: their moment", rate(case.moment_told for case in moved)),
         Goal("nothing missing: something named", rate(bool(case.new) or case.unanswered for case in harmless)),
         Goal("parameters, 90 % intervals cover", _covered(concealed), low=0.85, high=0.95),
         Goal("confidence: calibration error", error, high=0.07, of=len(found), percent=False),

@@ -28,9 +28,12 @@ def statement(result: Result) -> str:
         told = f"parameters of the bench file are wrong: {changes}." if changes else _together(result.torque_left)
         return " ".join(filter(None, (f"No physics is missing; {told}", cannot_show(result))))
     if result.verdict is Verdict.NO_MISMATCH:
-        told = _leaves(result.torque_left)
-        noise = f"The twin reproduces these recordings to within their noise{f' and {told}' if told else ''}."
-        return " ".join(filter(None, (noise, _wandering(result.unexplained.description), cannot_show(result))))
+        told, wanders = _leaves(result.torque_left), _wandering(result.unexplained.description)
+        nothing = "The twin reproduces these recordings to within their noise."
+        if told or wanders:
+            beside = f": the twin {told}, without a structure" if told else ""
+            nothing = f"Nothing is missing that these recordings show{beside}."
+        return " ".join(filter(None, (nothing, wanders, cannot_show(result))))
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget and not result.partial:

@@ -28,12 +28,12 @@ def said(**changes: Any) -> str:
 
 def test_an_all_clear_says_what_is_left_and_what_the_motion_cannot_show() -> None:
     assert said(verdict="no_mismatch", torque_left=TORQUE) == (
-        "The twin reproduces these recordings to within their noise and leaves 5.87 % of the torque on held-out motion "
-        f"unexplained, plain least squares 5.86 %. This motion cannot show 1 of {len(LIBRARY)} mechanisms, such as "
-        "thermal growth."
+        "Nothing is missing that these recordings show: the twin leaves 5.87 % of the torque on held-out motion "
+        "unexplained, plain least squares 5.86 %, without a structure. This motion cannot show 1 of "
+        f"{len(LIBRARY)} mechanisms, such as thermal growth."
     )
     told = said(verdict="no_mismatch", torque_left=TORQUE | {"final": 0.0065, "plain": 0.0046})
-    assert "plain least squares 0.460 % (right models differ by up to 0.500 %). This motion" in told
+    assert "plain least squares 0.460 % (right models differ by up to 0.500 %), without a structure. This" in told
     assert said(verdict="no_mismatch", not_testable=()) == (
         "The twin reproduces these recordings to within their noise."
     )

@@ -35,6 +35,10 @@ _CONSTANTS = {
     "counts/s": ("counts_per_rev", "counts_per_m"),
 }
 
+_OF_LENGTHS = (
+    " (angle and length convert if lead_m is given; the channels of a linear motor are motor_position_m and force_n)"
+)
+
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -227,7 +231,7 @@ class RecordingMap(_Strict):
             si = CHANNELS[name].unit
             if source.factor_to(si, lead_m) is None:
                 allowed = [*units_of(si, lead_m), *_CONSTANTS]
-                lead = "" if lead_m else " (angle and length convert if lead_m is given)"
+                lead = "" if lead_m else _OF_LENGTHS
                 raise FieldError(
                     ("channels", name, "unit"),
                     f"given {source.unit!r}, allowed {', '.join(allowed)}{lead}; correct the unit",

@@ -16,7 +16,10 @@ _COUNTS = "or counts, and below it the line counts_per_rev: VALUE"
 def position_unit(kind: AxisKind, channels: Iterable[str], nameless: bool) -> str:
     """Question for the unit of a position among `channels`; `nameless`: that it is one was found by relations."""
     if kind is AxisKind.ROTARY:
-        return f"its unit is not in the file; write rad, deg, rev; {_COUNTS}; {_OR_SCREW}"
+        return (
+            f"its unit is not in the file; write rad, deg, rev; {_COUNTS}; {_OR_SCREW}; or of a linear motor m or mm, "
+            f"and {_renamed(kind, channels)}"
+        )
     speed = (
         " If it is a velocity, write motor_velocity_m_s in place of motor_position_m and here m/s, mm/s or m/min; of a "
         "motor that turns motor_velocity_rad_s and rpm, rad/s or deg/s"
@@ -56,5 +59,5 @@ def _renamed(kind: AxisKind, channels: Iterable[str]) -> str:
     """Names of channels on the other kind of axis: motor_position_rad in place of motor_position_m."""
     (other,) = set(AxisKind) - {kind}
     pairs = [(getattr(AXIS_CHANNELS[kind], side), getattr(AXIS_CHANNELS[other], side)) for side in _SIDE]
-    given = set(channels)
+    given = set(channels) or {AXIS_CHANNELS[kind].motor_position, AXIS_CHANNELS[kind].torque}
     return " and ".join(f"{new} in place of {old}" for old, new in pairs if old in given)

@@ -105,3 +105,14 @@ def test_a_torque_of_another_axis_by_its_name_is_said_where_the_motion_does_not_
     draft = draft_map(write(tmp_path / "log.csv", columns))
     note = "Y_torque_Nm: by its name of axis y, X1_speed_rad_s of axis 1; check that it drives this axis"
     assert (note in draft.unsure) is noted
+
+
+@pytest.mark.parametrize(("unit", "size", "table"), [("mm", 1e3 * 0.01 / (2 * np.pi), True), ("deg", 57.296, False)])
+def test_an_angle_beside_a_length_is_no_set_point(tmp_path: Path, unit: str, size: float, table: bool) -> None:
+    """A wheel on the carriage is noisier than the motor's encoder; a set-point has the unit of the axis."""
+    noisy = size * (AXIS["angle"] + np.random.default_rng(4).normal(0.0, 0.05, AXIS["t"].size))
+    columns = {"t_s": AXIS["t"], "pos_deg": np.degrees(AXIS["angle"]), f"wheel_{unit}": noisy, "trq_Nm": AXIS["torque"]}
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    found = {one.channel: str(one.entry["column"]) for one in draft.channels}
+    assert (found.get("table_position_m") == "wheel_mm") is table
+    assert ("position_command_m" in found) is not table

@@ -27,7 +27,7 @@ from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
-from hil.identification.derivatives import matched
+from hil.identification.derivatives import matched, noise_gains
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
@@ -66,6 +66,17 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
         return None
     left = left_by_twin(fit.hypothesis, data, plain, deviation)
     return math.inf if left is None else left
+
+
+def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
+    """As `torque_missed`, without what the white noise of the torque makes of it; 0 where nothing tells."""
+    missed = torque_missed(fit, data)
+    plain = fit_plain(fit.data) if missed is not None else None
+    if missed is None or plain is None:
+        return 0.0
+    gains = [noise_gains(run.period_s, measured_motion(run).window)[0] * run.noise.torque for run in data.runs]
+    noise = float(np.sqrt(np.mean(np.square(gains)))) / torque_deviation([data], plain.slowest)
+    return math.sqrt(max(missed**2 - noise**2, 0.0))
 
 
 def mismatch_left(before: Fit, after: Fit, data: Dataset, noise: Collection[str] = ()) -> float:

@@ -28,6 +28,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
 from hil.identification.terms import Key, Term, ambiguous, same_torque
+from hil.identification.torque_left import missed_beyond_noise
 from hil.quantities import digits, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Dimension, Role
@@ -62,6 +63,7 @@ def findings(
     deviations = standard_errors(final)
     fits = [final.on(data) for data in (final.data, held_out) if data.runs]
     bench, terms, runs = final.bench, final.terms, final.data.runs
+    missed = missed_beyond_noise(final, held_out)
     result = []
     for index, (term, ablation) in enumerate(zip(terms, ablations, strict=True)):
         if index in forms:
@@ -84,7 +86,7 @@ def findings(
                     effect=term.effect,
                     variant=BY_ID[term.effect].forms[term.variant],
                     confidence=_sure(final, index)
-                    * confidence(_left(fits, ablation.channel), _factor(ablation), margin),
+                    * confidence(_left(fits, ablation.channel), _factor(ablation), margin, missed),
                     equivalents=tuple(dict.fromkeys(tied)),
                     rivals=tuple(
                         Rival(effect=rival.terms[-1].effect, evidence=rival_in_words(rival, term)) for rival in rivals

@@ -25,7 +25,8 @@ from hil.diagnosis.result import (
 from hil.diagnosis.stages import Judged, Progress, Reported
 from hil.diagnosis.statement import statement
 from hil.diagnosis.structure_left import Dependence, like_noise
-from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of
+from hil.diagnosis.verdict.corrections import corrections, diagnosed_bench
+from hil.diagnosis.verdict.findings import findings, form_of
 from hil.diagnosis.verdict.fit_table import closed_loop_held, fit_table
 from hil.diagnosis.verdict.in_bench import in_bench
 from hil.diagnosis.verdict.judge import unexplained_share

@@ -13,7 +13,6 @@ from hil.diagnosis.wording import listed, named, spoken, titles
 from hil.identification.least_squares import SIGMAS
 from hil.quantities import percent, quantity
 
-MENTIONED = 0.05  # confidence from which the statement mentions a doubtful effect; the table has all
 _MORE = 1.1  # times what plain least squares leave, from which a reader asks
 
 
@@ -69,7 +68,7 @@ def _wandering(left: str) -> str:
 def _found(before: str, found: Sequence[Finding]) -> str:
     """What is there, in one sentence each; then what may be there, in one clause."""
     likely = [one for one in found if one.confidence >= CRITERIA.likely]
-    others = [one for one in found if one not in likely and one.confidence >= MENTIONED]
+    others = [one for one in found if one not in likely]
     perhaps = listed([f"{named(one)} ({percent(one.confidence)})" for one in others])
     if not likely:
         likely = [max(found, key=lambda one: one.confidence)]

@@ -1,7 +1,8 @@
 """Mechanisms in a hypothesis, and the rules by which they are compatible."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, count
 from typing import NamedTuple
 
@@ -141,3 +142,12 @@ def compatible(mechanisms: Sequence[Term | Active]) -> bool:
 def effects(terms: Sequence[Term]) -> list[tuple[str, int]]:
     """Effect and variant of each term, in alphabetical order."""
     return sorted((term.effect, term.variant) for term in terms)
+
+
+def within_a_turn(term: Term) -> Term:
+    """The term with its phases reduced to one turn."""
+    values = tuple(
+        math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value
+        for value, parameter in zip(term.values, BY_ID[term.effect].parameters, strict=True)
+    )
+    return replace(term, values=values)

@@ -6,7 +6,7 @@ from hil.bench.bench_file import Bench
 from hil.bench.control_section import UNKNOWN, UnknownControl, delay_in_words
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.value import Correction
-from hil.diagnosis.verdict.findings import not_split
+from hil.diagnosis.verdict.corrections import not_split
 from hil.errors import FieldPath
 from hil.files.yaml_edit import YamlChange
 from hil.identification.coordinates import DELAY, known_coordinates, known_values

@@ -1,29 +1,24 @@
 """Section of a report: each finding with its picture, its values and its alternatives."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.findings import finding_figure
 from hil.diagnosis.result import Finding
-from hil.diagnosis.statement import MENTIONED
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.value import Value
 from hil.diagnosis.wording import label, parameter_of, title, titles
 from hil.figures.drawing import save
 from hil.identification.terms import Term
-from hil.quantities import digits, percent, reading_unit, with_error
+from hil.quantities import digits, reading_unit, with_error
 from hil.report.page import Page
 from hil.twin.library import BY_ID
 
 
 def findings_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
-    """Add the findings with their pictures; those that are hardly there by their confidence in one table."""
-    findings = diagnosis.result.findings
-    shown = [at for at, one in enumerate(findings) if one.confidence >= MENTIONED] or list(range(len(findings)))
-    for index in shown:
+    """Add the findings with their pictures."""
+    for index in range(len(diagnosis.result.findings)):
         _finding(page, diagnosis, index, folder)
-    _hardly(page, [one for at, one in enumerate(findings) if at not in shown])
 
 
 def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None:
@@ -64,17 +59,6 @@ def _finding(page: Page, diagnosis: Diagnosis, index: int, folder: Path) -> None
             ("alternative", "compared with this finding"),
             [(title(rival.effect), rival.evidence) for rival in finding.rivals],
             left=(0, 1),
-        )
-
-
-def _hardly(page: Page, findings: Sequence[Finding]) -> None:
-    """Findings that are hardly there by their confidence."""
-    if findings:
-        page.heading("What is hardly there")
-        page.table(
-            ("named by the search", "confidence", "evidence"),
-            [(one.sentence, percent(one.confidence), one.needed) for one in findings],
-            left=(0, 2),
         )
 
 

@@ -9,29 +9,27 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from hil.bench.axis_fields import RATIOS
-from hil.bench.bench_file import Bench, MechanismEntry
+from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Finding, Rival
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.sentence import TermErrors, rate_in_words, sentence
 from hil.diagnosis.stages import Searched
-from hil.diagnosis.value import Correction, Value
+from hil.diagnosis.value import Value
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
 from hil.diagnosis.verdict.event_windows import describe_event
 from hil.diagnosis.verdict.strength import strength_errors, strength_over_error
 from hil.diagnosis.wording import title, unit_in
-from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
-from hil.identification.terms import Key, Term, ambiguous, same_torque
+from hil.identification.terms import Key, Term, ambiguous, same_torque, within_a_turn
 from hil.identification.torque_left import missed_beyond_noise
-from hil.quantities import digits, unit_of
+from hil.quantities import digits
 from hil.twin.library import BY_ID
-from hil.twin.parameter import Dimension, Role
+from hil.twin.parameter import Dimension
 
 
 def renamed(fit: Fit) -> Fit:
@@ -60,24 +58,14 @@ def findings(
     held_out: Dataset,
 ) -> tuple[Finding, ...]:
     """Make a finding of each term that is not part of another (`forms`), the one with most energy first."""
-    deviations = standard_errors(final)
-    fits = [final.on(data) for data in (final.data, held_out) if data.runs]
-    bench, terms, runs = final.bench, final.terms, final.data.runs
-    missed = missed_beyond_noise(final, held_out)
+    deviations, sure = standard_errors(final), confidences(searched, final, ablations, held_out)
+    bench, terms = final.bench, final.terms
     result = []
     for index, (term, ablation) in enumerate(zip(terms, ablations, strict=True)):
         if index in forms:
             continue
         errors = deviations[final.hypothesis.columns(index)]
-        beside = {one.effect for one in terms if one is not term and BY_ID[one.effect].most == 1}
-        rivals = [one for one in rivals_of(searched, term) if one.terms[-1].effect not in beside]  # those are no equals
-        tied = [rival.terms[-1].effect for rival in rivals if rival.tied]
-        others = [name for name in same_torque(term) if name != term.effect]
-        tied += [name for name in others if claimable(replace(term, effect=name), bench, runs)]
-        margin = min(
-            (rival.evidence for rival in rivals if rival.terms[-1].effect not in tied),
-            default=searched.needed.get(key_in_search(searched, term), math.inf),
-        )
+        rivals, tied, _ = _against(searched, final, term)
         event = describe_event(final, index, held_out) if term.windows else None
         result.append(
             (
@@ -85,9 +73,8 @@ def findings(
                 Finding(
                     effect=term.effect,
                     variant=BY_ID[term.effect].forms[term.variant],
-                    confidence=_sure(final, index)
-                    * confidence(_left(fits, ablation.channel), _factor(ablation), margin, missed),
-                    equivalents=tuple(dict.fromkeys(tied)),
+                    confidence=sure[index],
+                    equivalents=tied,
                     rivals=tuple(
                         Rival(effect=rival.terms[-1].effect, evidence=rival_in_words(rival, term)) for rival in rivals
                     ),
@@ -96,13 +83,13 @@ def findings(
                     train=event.train if event else None,
                     sentence=event.sentence
                     if event
-                    else sentence(_normal(term), bench, _errors(final, index, deviations)),
+                    else sentence(within_a_turn(term), bench, _errors(final, index, deviations)),
                     form=" ".join(
-                        sentence(_normal(terms[other]), bench, _errors(final, other, deviations))
+                        sentence(within_a_turn(terms[other]), bench, _errors(final, other, deviations))
                         for other, law in forms.items()
                         if law == index
                     ),
-                    rate=rate_in_words(_normal(term), bench, _errors(final, index, deviations)),
+                    rate=rate_in_words(within_a_turn(term), bench, _errors(final, index, deviations)),
                     needed=_needed(ablation),
                 ),
             )
@@ -110,71 +97,37 @@ def findings(
     return tuple(finding for _, finding in sorted(result, key=lambda pair: -pair[0]))
 
 
-def corrections(bench_file: Bench, fit: Fit) -> dict[str, Correction]:
-    """Nominal parameters of the bench file and as fitted; without a torque only the damping of the transmission.
-
-    Motion alone gives the ratio of stiffness and mass, and nothing of the motor side. A parameter that ended at the
-    bound of the allowed range, or was left as it is, has no correction, and no mass beside one that did (`not_split`).
-    Values of the bench's mechanisms are among them.
-    """
-    hypothesis = fit.hypothesis
-    told = hypothesis.nominal if fit.data.observability.torque_measured else RATIOS
-    entries = zip(
-        hypothesis.bench_values, hypothesis.coordinates, hypothesis.values, standard_errors(fit), strict=False
-    )
-    return {
-        one.name: Correction(
-            nominal=before,
-            value=value,
-            std=std,
-            unit=unit_of(one.name) if one.parameter is None else unit_in(bench_file, one.parameter),
-        )
-        for before, one, value, std in entries
-        if one.name in told
-        and one.name not in (*fit.at_bound, *not_split(bench_file, fit.at_bound), DELAY)
-        and not math.isclose(value, before)
-        and (before or value > CRITERIA.sigmas * std)
-    }
-
-
-def not_split(bench: Bench, at_bound: Sequence[str]) -> tuple[str, ...]:
-    """Masses of the axis if one of them ended at its bound: their sum is told, and no single one."""
-    masses = bench.axis.MASSES
-    return masses if set(masses) & set(at_bound) else ()
-
-
-def diagnosed_bench(bench_file: Bench, fit: Fit) -> Bench:
-    """Bench file with the parameters and permanent terms of a fit; every other command accepts it.
-
-    An event is not expected in another recording.
-    """
-    entries = tuple(
-        MechanismEntry(
-            effect=term.effect,
-            variant=BY_ID[term.effect].forms[term.variant],
-            parameters=dict(zip(BY_ID[term.effect].names, _normal(term).values, strict=True)),
-        )
-        for term in fit.terms
-        if not term.windows
-    )
-    return fit.bench.model_copy(
-        update={"name": f"{bench_file.name}_diagnosed", "mechanisms": fit.hypothesis.kept + entries}
+def confidences(searched: Searched, final: Fit, ablations: Sequence[Ablation], held_out: Dataset) -> tuple[float, ...]:
+    """Confidence of each term of a fit, in [0, 1]."""
+    fits = [final.on(data) for data in (final.data, held_out) if data.runs]
+    missed = missed_beyond_noise(final, held_out)
+    margins = [_against(searched, final, term)[2] for term in final.terms]
+    return tuple(
+        _sure(final, index) * confidence(_left(fits, ablation.channel), _factor(ablation), margin, missed)
+        for index, (ablation, margin) in enumerate(zip(ablations, margins, strict=True))
     )
 
 
-def _normal(term: Term) -> Term:
-    """Reduce phases to one turn."""
-    values = tuple(
-        math.remainder(value, 2.0 * math.pi) if parameter.role is Role.PHASE else value
-        for value, parameter in zip(term.values, BY_ID[term.effect].parameters, strict=True)
+def _against(searched: Searched, final: Fit, term: Term) -> tuple[list[RivalFit], tuple[str, ...], float]:
+    """Rivals of a term, the ids that are not distinguishable from it, and the evidence against the best other one."""
+    beside = {one.effect for one in final.terms if one is not term and BY_ID[one.effect].most == 1}
+    rivals = [one for one in rivals_of(searched, term) if one.terms[-1].effect not in beside]  # those are no equals
+    tied = [rival.terms[-1].effect for rival in rivals if rival.tied]
+    others = [name for name in same_torque(term) if name != term.effect]
+    tied += [name for name in others if claimable(replace(term, effect=name), final.bench, final.data.runs)]
+    margin = min(
+        (rival.evidence for rival in rivals if rival.terms[-1].effect not in tied),
+        default=searched.needed.get(key_in_search(searched, term), math.inf),
     )
-    return replace(term, values=values)
+    return rivals, tuple(dict.fromkeys(tied)), margin
 
 
 def _values(term: Term, errors: Sequence[float], bench: Bench) -> dict[str, Value]:
     return {
         parameter.name: Value(value=value, std=error, unit=unit_in(bench, parameter))
-        for parameter, value, error in zip(BY_ID[term.effect].parameters, _normal(term).values, errors, strict=True)
+        for parameter, value, error in zip(
+            BY_ID[term.effect].parameters, within_a_turn(term).values, errors, strict=True
+        )
     }
 
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.events import with_events_of
-from hil.diagnosis.search.forward_selection import carried, over
+from hil.diagnosis.search.forward_selection import carried, claimed, over
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
-from hil.diagnosis.verdict.findings import renamed, rivals_of
+from hil.diagnosis.verdict.findings import confidences, form_of, renamed, rivals_of
 from hil.diagnosis.verdict.refit import reported_refit
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -30,12 +30,13 @@ def test_on_held_out(searched: Searched) -> Tested:
     data, plain = final.data, fit_plain(final.data)
     rivals = {term.key: rivals_of(searched, term) for term in final.terms}
     if data is searched.prepared.train:
-        return _tested(searched, cross_validate(nominal, final, held_out, rivals))
+        return _tested(searched, likely(searched, nominal, cross_validate(nominal, final, held_out, rivals), held_out))
     there = held_out.louder(data.set_aside)
     if data.apart and plain:  # by a twin that holds the motion
         reference = nominal if nominal.within_noise else final
         there = noise_apart(there, reference.hypothesis, plain)
-    proof = cross_validate(over(data, nominal), final, there, rivals)
+    base = over(data, nominal)
+    proof = likely(searched, base, cross_validate(base, final, there, rivals), there)
     return _tested(searched, replace(proof, final=carried(searched.prepared.train, proof.final)))
 
 
@@ -54,3 +55,22 @@ def with_own_noise(fit: Fit, held_out: Dataset) -> Fit:
 def _tested(searched: Searched, proof: CrossValidation) -> Tested:
     known = {**searched.rivals, **proof.rivals}
     return Tested(replace(searched, rivals=known), proof, reported_refit(searched.nominal))
+
+
+def likely(searched: Searched, nominal: Fit, proof: CrossValidation, held_out: Dataset) -> CrossValidation:
+    """The proof without the terms whose confidence is too low for a name, the least one first.
+
+    A term that corrects the form of another one has no name of its own.
+    """
+    while proof.ablations:
+        compared = replace(searched, rivals={**searched.rivals, **proof.rivals})
+        sure = confidences(compared, proof.final, proof.ablations, held_out)
+        own = [index for index in range(len(sure)) if index not in form_of(compared, proof.ablations)]
+        least = min(own, key=lambda index: sure[index])
+        if sure[least] >= CRITERIA.named:
+            break
+        hardly = proof.ablations[least]
+        rest = claimed(hardly.without.refit(30)) if hardly.without.terms else hardly.without
+        fewer = cross_validate(nominal, rest, held_out, proof.rivals)
+        proof = replace(fewer, dropped=(*proof.dropped, hardly, *fewer.dropped))
+    return proof

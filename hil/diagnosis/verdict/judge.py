@@ -11,8 +11,8 @@ from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
+from hil.diagnosis.verdict.corrections import corrections
 from hil.diagnosis.verdict.each_alone import Change, changed
-from hil.diagnosis.verdict.findings import corrections
 from hil.diagnosis.verdict.reproduction import reproduction
 from hil.diagnosis.verdict.unnamed import unnamed_terms
 from hil.identification.coordinates import DELAY

@@ -10,7 +10,7 @@ from diagnosis_runs import bench, evaluated, recorded
 
 from hil.diagnosis.acceptance import is_event
 from hil.diagnosis.search.events import inside_windows
-from hil.diagnosis.verdict.findings import diagnosed_bench
+from hil.diagnosis.verdict.corrections import diagnosed_bench
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.terms import Term, Window

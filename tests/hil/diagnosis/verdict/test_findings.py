@@ -16,8 +16,9 @@ from hil.diagnosis.notes import at_bound, on_fit
 from hil.diagnosis.result import Finding
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.search.score_test import screen_library
+from hil.diagnosis.verdict.corrections import corrections, diagnosed_bench
 from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
-from hil.diagnosis.verdict.findings import corrections, diagnosed_bench, findings, form_of, renamed, rival_in_words
+from hil.diagnosis.verdict.findings import findings, form_of, renamed, rival_in_words
 from hil.diagnosis.verdict.refit import reported_refit
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit

@@ -10,8 +10,9 @@ from hil.bench.bench_file import Bench
 from hil.diagnosis.acceptance import names_stand
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.rivals import RivalFit
+from hil.diagnosis.verdict.corrections import diagnosed_bench
 from hil.diagnosis.verdict.cross_validation import cross_validate
-from hil.diagnosis.verdict.findings import diagnosed_bench, findings, renamed
+from hil.diagnosis.verdict.findings import findings, renamed
 from hil.diagnosis.verdict.judge import verdict_on_plant
 from hil.diagnosis.verdict.testability import not_testable
 from hil.identification.dataset import Dataset

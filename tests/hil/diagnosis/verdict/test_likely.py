@@ -1,0 +1,46 @@
+"""A term whose confidence is too low for a name is dropped, and what stands beside it stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from diagnosis_runs import bench, dataset, fitted, recorded
+
+from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.search.rivals import RivalFit
+from hil.diagnosis.verdict.cross_validation import cross_validate
+from hil.diagnosis.verdict.findings import confidences
+from hil.diagnosis.verdict.held_out import likely
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.measured import take
+from hil.identification.terms import Term
+
+OWNER = bench()
+COGGING, LOAD = Term("cogging_torque", 0, (0.3, 6.0, 0.2)), Term("constant_load", 0, (0.08,))
+
+
+@dataclass
+class Search:
+    """What a search knows of the terms that were not named."""
+
+    rivals: dict[Any, list[RivalFit]] = field(default_factory=dict)
+    needed: dict[Any, float] = field(default_factory=dict)
+
+
+def test_a_term_that_hardly_stands_is_no_name() -> None:
+    """A small load beside a large effect that has no name: its odds fall where the search hardly needed it."""
+    data = dataset([take(recorded(OWNER, COGGING, LOAD, seed=1), OWNER)], OWNER)
+    final = fitted(Hypothesis(OWNER, (LOAD,)), data, evaluations=6)
+    nominal, held_out = fitted(Hypothesis(OWNER), data, evaluations=6), data.over(())
+    proof = cross_validate(nominal, final, held_out)
+    assert [one.term.effect for one in proof.ablations] == ["constant_load"]
+    (sure,) = confidences(Search(), proof.final, proof.ablations, held_out)  # type: ignore[arg-type]
+    assert sure > CRITERIA.named
+    assert likely(Search(), nominal, proof, held_out).final is proof.final  # type: ignore[arg-type]
+    doubted = Search(needed={final.terms[0].key: 1.0})
+    (doubtful,) = confidences(doubted, proof.final, proof.ablations, held_out)  # type: ignore[arg-type]
+    assert doubtful < CRITERIA.named
+    kept = likely(doubted, nominal, proof, held_out)  # type: ignore[arg-type]
+    assert not kept.final.terms
+    assert [one.term.effect for one in kept.dropped] == ["constant_load"]

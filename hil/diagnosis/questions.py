@@ -68,6 +68,8 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
 
 def in_turn(runs: Sequence[Measured]) -> list[Measured]:
     """The runs in order of time; none unless each ends before the next begins, as parts of one recording do."""
+    if not all(run.time_s[run.evaluated].size for run in runs):
+        return []
     ordered = sorted(runs, key=lambda run: float(run.time_s[run.evaluated][0]))
     apart = all(one.time_s[one.evaluated][-1] <= two.time_s[two.evaluated][0] for one, two in pairwise(ordered))
     return ordered if apart else []
@@ -81,7 +83,7 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
     duration = 1.001 * max(float(one[-1]) for one in since)
     up = [measured_motion(run).moved.velocity > 0.0 for run in data.runs]
     later = tuple(one + duration * moves for one, moves in zip(since, up, strict=True))
-    return Question("time", "s", length, later, 2 * BINS, duration)
+    return Question("time", "s", length, later, 2 * BINS, duration, begin)
 
 
 def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:

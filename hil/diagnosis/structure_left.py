@@ -101,10 +101,16 @@ class Dependence:
 
 def _changed(change: MomentOfChange, drive_unit: str) -> str:
     """Say from which moment on which coefficient is larger or smaller."""
-    name, units = _COEFFICIENTS[change.coefficient]
-    size = quantity(abs(change.change), units.get(drive_unit, drive_unit))
+    name, unit = coefficient(change, drive_unit)
+    size = quantity(abs(change.change), unit)
     more = "larger" if change.change > 0.0 else "smaller"
     return f"from {change.moment_s:.2f} s on {name} is {size} {more} than before"
+
+
+def coefficient(change: MomentOfChange, drive_unit: str) -> tuple[str, str]:
+    """Name in words and unit of the coefficient that changes."""
+    name, units = _COEFFICIENTS[change.coefficient]
+    return name, units.get(drive_unit, drive_unit)
 
 
 def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
@@ -212,7 +218,7 @@ def _dependences(
         yield Dependence(channel, question, found, found.energy / total, found.energy / least, None)
     if channel == TORQUE and one_way and (at := at_a_moment(whole, of_whole, plain)) and at.change:
         found = at.change.course
-        yield Dependence(channel, at, found, found.energy / total, found.energy / least, None)
+        yield Dependence(channel, at, found, min(found.energy / total, 1.0), found.energy / least, None)
 
 
 def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:

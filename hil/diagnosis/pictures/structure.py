@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hil.diagnosis.questions import OFFSET
-from hil.diagnosis.structure_left import TORQUE, Dependence
+from hil.diagnosis.structure_left import TORQUE, Dependence, coefficient
 from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.quantities import reading_unit
@@ -43,6 +43,8 @@ def _units(one: Dependence, drive_unit: str) -> tuple[float, str, float, str]:
     """Factor and unit of the quantity, factor and unit of the residual."""
     along, along_unit = reading_unit(one.question.unit, float(np.max(np.abs(one.found.edges))))
     unit = drive_unit if one.channel == TORQUE else one.question.length
+    if change := one.question.change:
+        _, unit = coefficient(change, drive_unit)
     factor, name = reading_unit(unit, float(np.max(np.abs(one.found.means))))
     return along, along_unit, factor, name
 
@@ -55,11 +57,13 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
     if turn:
         parts = [("moving backwards", middle < turn, COMMAND), ("moving forwards", middle >= turn, MEASURED)]
     for label, rows, colour in parts:
-        x = middle[rows] - (turn if label == "moving forwards" else 0.0)
+        x = one.question.least + middle[rows] - (turn if label == "moving forwards" else 0.0)
         y, error = factor * found.means[rows], factor * found.errors[rows]
         axis.errorbar(along * x, y, error, color=colour, label=label, fmt="o-", markersize=4, capsize=3, linewidth=0.8)
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
+    if change := one.question.change:
+        what = f"{coefficient(change, drive_unit)[0]} beyond the twin's"
     title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name.partition(' (')[0]}"
     style_axis(axis, f"{what}\n[{unit}]", f"{one.question.name} [{along_unit}]", title)
     if turn:

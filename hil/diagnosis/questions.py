@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.moment_of_change import MomentOfChange, moment_of_change
+from hil.diagnosis.result import MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
@@ -90,7 +91,7 @@ def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainMode
     """The moment from which a coefficient of the plain model is another one; None where the rows do not tell one."""
     columns = [plain_columns(measured_motion(run).moved, plain.load_ratio) for run in data.runs]
     found = moment_of_change(parts, columns, [run.time_s for run in data.runs])
-    return Question("time", "s", "", (), change=found) if found else None
+    return Question(MOMENT, "s", "", (), change=found) if found else None
 
 
 def strongest_line(

@@ -140,6 +140,7 @@ class ChannelFit(ResultPart):
 AT_FLOOR = (
     "Block by block, with measured inputs, the residuals of all channels are within the noise of positions and torque."
 )
+MOMENT = "moment"  # what a structure depends on where the axis is another one from a moment on
 NO_STRUCTURE = "(no structure)"  # behind a channel whose remainder depends on nothing
 
 

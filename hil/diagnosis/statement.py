@@ -7,7 +7,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
 from hil.diagnosis.ledger import EXPLAINS
 from hil.diagnosis.open_questions import cannot_show
-from hil.diagnosis.result import AT_FLOOR, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
+from hil.diagnosis.result import AT_FLOOR, MOMENT, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import listed, named, spoken, titles
 from hil.identification.least_squares import SIGMAS
@@ -175,4 +175,6 @@ def _together(left: TorqueLeft | None) -> str:
 
 
 def _depends(result: Result) -> str:
-    return f" Structure is left: {result.structure[0].text}." if result.structure else ""
+    """The strongest structure that is left, and the moment from which the axis is another one; empty without any."""
+    told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over == MOMENT]
+    return f" Structure is left: {'; '.join(told)}." if told else ""

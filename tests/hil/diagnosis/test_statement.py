@@ -39,6 +39,13 @@ def test_an_all_clear_says_what_is_left_and_what_the_motion_cannot_show() -> Non
     )
 
 
+def test_the_moment_of_a_change_is_told_beside_a_stronger_structure() -> None:
+    left = {"description": "Residuals above the noise (rms): torque 3.00 times.", "share": 0.5}
+    moment = TIME | {"over": "moment", "text": "from 3.54 s on the Coulomb friction is 0.169 N m smaller than before"}
+    told = said(verdict="unexplained", unexplained=left, structure=(TIME, TIME | {"over": "speed"}, moment))
+    assert told.endswith(f"Structure is left: {TIME['text']}; {moment['text']}.")
+
+
 def test_what_is_below_the_noise_of_a_row_is_no_mismatch_above_it() -> None:
     told = said(verdict="unexplained", structure=(TIME,))
     assert told == f"No named physics is missing; below the noise of a row, {TIME['text']}."

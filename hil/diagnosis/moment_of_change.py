@@ -42,7 +42,10 @@ def moment_of_change(
     parts: Sequence[ResidualSeries], columns: Sequence[Columns], times_s: Sequence[FloatArray]
 ) -> MomentOfChange | None:
     """Find the moment with most evidence in residuals, columns and times (n,) of runs; None where rows are few."""
-    order = sorted(range(len(parts)), key=lambda run: float(times_s[run][0]))
+    counted = [run for run, part in enumerate(parts) if part.rows.any()]
+    order = sorted(counted, key=lambda run: float(times_s[run][parts[run].rows][0]))
+    if not order:
+        return None
     left, time_s = (
         np.concatenate([one[run][parts[run].rows] for run in order]) for one in ([p.left for p in parts], times_s)
     )

@@ -89,7 +89,8 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
 
 def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
     """The moment from which a coefficient of the plain model is another one; None where the rows do not tell one."""
-    columns = [plain_columns(measured_motion(run).moved, plain.load_ratio) for run in data.runs]
+    turning = plain.load_ratio if "sine" in plain.fit.names else None  # an arc that tells gravity
+    columns = [plain_columns(measured_motion(run).moved, turning) for run in data.runs]
     found = moment_of_change(parts, columns, [run.time_s for run in data.runs])
     return Question(MOMENT, "s", "", (), change=found) if found else None
 

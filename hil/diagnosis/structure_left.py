@@ -212,13 +212,14 @@ def _dependences(
     runs = (*fit.data.runs, *held_out.runs)
     one_way = bool(in_turn(runs))  # parts of a recording: its time goes on
     whole, of_whole = (fit.data.over(runs), [*parts, *others]) if one_way else (fit.data, parts)
+    all_of_it = float(np.var(np.concatenate([part.left[part.rows] for part in of_whole])))
     question = over_time(fit.hypothesis, whole)
     if found := structure(of_whole, question.values, question.bins):
         found = replace(found, p=max(found.p, slow(of_whole, question.values, found)))
-        yield Dependence(channel, question, found, found.energy / total, found.energy / least, None)
+        yield Dependence(channel, question, found, found.energy / all_of_it, found.energy / least, None)
     if channel == TORQUE and one_way and (at := at_a_moment(whole, of_whole, plain)) and at.change:
         found = at.change.course
-        yield Dependence(channel, at, found, min(found.energy / total, 1.0), found.energy / least, None)
+        yield Dependence(channel, at, found, min(found.energy / all_of_it, 1.0), found.energy / least, None)
 
 
 def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:

@@ -69,10 +69,10 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
 
 
 def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
-    """As `torque_missed`, without what the white noise of the torque makes of it; 0 where nothing tells."""
+    """As `torque_missed`, without what white noise of the torque makes of it; 0 where it is infinite or not told."""
     missed = torque_missed(fit, data)
     plain = fit_plain(fit.data) if missed is not None else None
-    if missed is None or plain is None:
+    if missed is None or plain is None or not math.isfinite(missed):
         return 0.0
     gains = [noise_gains(run.period_s, measured_motion(run).window)[0] * run.noise.torque for run in data.runs]
     noise = float(np.sqrt(np.mean(np.square(gains)))) / torque_deviation([data], plain.slowest)

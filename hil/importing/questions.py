@@ -59,5 +59,6 @@ def _renamed(kind: AxisKind, channels: Iterable[str]) -> str:
     """Names of channels on the other kind of axis: motor_position_rad in place of motor_position_m."""
     (other,) = set(AxisKind) - {kind}
     pairs = [(getattr(AXIS_CHANNELS[kind], side), getattr(AXIS_CHANNELS[other], side)) for side in _SIDE]
-    given = set(channels) or {AXIS_CHANNELS[kind].motor_position, AXIS_CHANNELS[kind].torque}
+    names = AXIS_CHANNELS[kind]
+    given = set(channels) & {old for old, _ in pairs} or {names.motor_position, names.torque}
     return " and ".join(f"{new} in place of {old}" for old, new in pairs if old in given)

@@ -47,11 +47,11 @@ def changed(nominal: Fit, held_out: Dataset) -> Change | None:
     `nominal` is the fit of one set of parameters to the recordings of training.
     """
     runs = (*nominal.data.runs, *held_out.runs)
+    ordered = in_turn(runs)
+    if ordered and (found := _changed_within(fit_nominal_parameters(nominal.data.over(ordered)))):
+        return found
     alone = _each(nominal.data, runs)
     if len(runs) > 1 and all(fit.at_floor for fit in alone):
-        ordered = in_turn(runs)
-        if ordered and (found := _changed_within(fit_nominal_parameters(nominal.data.over(ordered)))):
-            return found
         names = tuple(run.name for run in runs)
         told = AxisChange(recording=None, moment_s=None, parts=names, parameters=_differing(alone))
         if told.parameters:
@@ -66,12 +66,12 @@ def _changed_within(whole: Fit) -> Change | None:
         return None
     number, row = at
     cut = runs[number]
-    settled = row + round(SETTLE_IN_MOTION_S / cut.period_s)
+    settling = round(SETTLE_IN_MOTION_S / cut.period_s)
     before, after = [*runs[:number]], [*runs[number + 1 :]]
-    if row > cut.evaluated.indices(cut.motor.size)[0] + settled - row:
+    if row > cut.evaluated.indices(cut.motor.size)[0] + settling:
         before.append(cut.until(row))
-    if settled < cut.motor.size:
-        after.insert(0, replace(cut, lead_in=settled))
+    if row + 2 * settling < cut.motor.size:
+        after.insert(0, replace(cut, lead_in=row + settling))
     if not before or not after:
         return None
     fits = [fit_nominal_parameters(whole.data.over(part)) for part in (before, after)]
@@ -120,7 +120,7 @@ def _moment(whole: Fit) -> tuple[int, int] | None:
         table = np.concatenate([part[: count * block].reshape(count, block, -1) for part in own], axis=1)
         products += list(np.einsum("bij,bik->bjk", table, table))
         first = run.evaluated.indices(run.motor.size)[0]
-        rows += [(number, first + (one + 1) * block) for one in range(count)]
+        rows += [(number, min(first + (one + 1) * block, run.motor.size - 1)) for one in range(count)]
     margin = max(round(_SHORTEST * len(rows)), 1)
     cuts = range(margin, len(rows) - margin)
     if not cuts or not whole.jacobian.shape[1]:

@@ -60,11 +60,14 @@ def _tested(searched: Searched, proof: CrossValidation) -> Tested:
 def likely(searched: Searched, nominal: Fit, proof: CrossValidation, held_out: Dataset) -> CrossValidation:
     """The proof without the terms whose confidence is too low for a name, the least one first.
 
-    A term that corrects the form of another one has no name of its own.
+    Confidence is that on the recordings themselves, whatever channels the proof sets aside. A term that corrects the
+    form of another one has no name of its own.
     """
+    recorded = searched.prepared
     while proof.ablations:
         compared = replace(searched, rivals={**searched.rivals, **proof.rivals})
-        sure = confidences(compared, proof.final, proof.ablations, held_out)
+        final = proof.final if proof.final.data is recorded.train else carried(recorded.train, proof.final)
+        sure = confidences(compared, final, proof.ablations, recorded.held_out)
         own = [index for index in range(len(sure)) if index not in form_of(compared, proof.ablations)]
         least = min(own, key=lambda index: sure[index])
         if sure[least] >= CRITERIA.named:

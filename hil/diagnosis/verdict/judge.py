@@ -43,10 +43,11 @@ def judge(tested: Tested) -> Judged:
     searched, final, refit = tested.searched, tested.proof.final, tested.refit
     held_out, law = searched.prepared.held_out, searched.prepared.law
     of_plant, change = verdict_on_plant(searched.given, searched.nominal, final, held_out), None
-    moves = final.terms and any(one.question.change for one in structure_left(final, held_out))  # beside all names
+    named = of_plant is Verdict.MISSING_PHYSICS
+    moves = named and any(one.question.change for one in structure_left(final, held_out))  # beside all names
     if (of_plant is Verdict.UNEXPLAINED or moves) and not searched.stopped_at:
         change = _better(changed(refit.fit, held_out), searched.nominal, final, held_out)
-    if change and of_plant is Verdict.MISSING_PHYSICS and not _needs_less_torque(change, final, held_out):
+    if change and named and not _needs_less_torque(change, final):
         change = None
     if change and change.explains_all:
         of_plant = Verdict.AXIS_CHANGED
@@ -58,8 +59,8 @@ def judge(tested: Tested) -> Judged:
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
     of_parts = change.parts if change and change.explains_all else ()
-    left = tuple(one for part in of_parts for one in structure_left(part, part.data.over([])))
-    left = left if of_parts else structure_left(final, held_out)
+    of_each = [one for part in of_parts for one in structure_left(part, part.data.over([]))]
+    left = tuple(sorted(of_each, key=lambda one: -one.explained)) if of_parts else structure_left(final, held_out)
     maps = () if change else unnamed_terms(final, left, held_out)
     return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left, maps)
 
@@ -131,12 +132,12 @@ def told_apart(nominal: Fit) -> bool:
     return any(abs(one.value - one.nominal) > CRITERIA.sigmas * one.std for one in changed)
 
 
-def _needs_less_torque(change: Change, named: Fit, held_out: Dataset) -> bool:
-    """True if parameters of each part leave less torque than the names do."""
+def _needs_less_torque(change: Change, named: Fit) -> bool:
+    """True if parameters of each part leave less torque in the recordings that change than the names do."""
     plain = fit_plain(named.data)
     if plain is None or not change.explains_all:
         return False
-    whole = [(named.hypothesis, data) for data in (named.data, held_out) if data.runs]
+    whole = [(named.hypothesis, named.data.over(change.runs))]
     parts = [(part.hypothesis, part.data) for part in change.parts]
     left, less = (
         np.concatenate([one.left[one.rows] for twin, data in twins for one in needed_torque(twin, data, plain)])

@@ -52,6 +52,21 @@ def test_the_coefficient_and_its_moment_are_found_over_two_parts(name: str, at_s
     assert late - early == pytest.approx(size, rel=0.2)
 
 
+def test_a_part_that_begins_with_rows_of_the_one_before_it_comes_after_it() -> None:
+    """Rows from which a twin gets its state do not count, and do not order the parts."""
+    left = 0.1 * coloured(2, 0.02) + 0.02 * COLUMNS["viscous"] * (TIME_S >= 18.0)
+    cut = ROWS // 2
+    later = np.arange(ROWS) >= cut
+    parts = [ResidualSeries(left, later), ResidualSeries(left[:cut], np.ones(cut, dtype=bool))]
+    columns = [COLUMNS, {name: one[:cut] for name, one in COLUMNS.items()}]
+    found = moment_of_change(parts, columns, [TIME_S, TIME_S[:cut]])
+    assert found is not None
+    assert found.moment_s == pytest.approx(18.0, abs=0.3)
+    assert np.all(np.diff(found.course.edges) > 0.0)
+    nothing = [part._replace(rows=np.zeros(part.left.size, dtype=bool)) for part in parts]
+    assert moment_of_change(nothing, columns, [TIME_S, TIME_S[:cut]]) is None
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([0.01, 0.1, 0.5]))
 def test_noise_changes_at_no_moment(seed: int, correlation_s: float) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from diagnosis_runs import bench, dataset, recorded
 
@@ -38,3 +40,16 @@ def test_alike_recordings_and_those_that_are_not_explained_alone_say_nothing() -
     assert not differing(OWNER, OWNER)
     assert not differing(OWNER)
     assert not differing(rough(1.3), OWNER, terms=(Term("cogging_torque", 0, (0.3, 6.0, 0.2)),))
+
+
+def test_a_change_at_the_end_of_a_part_is_told_with_its_moment() -> None:
+    """Two recordings whose times follow each other: the axis is another one from the second on."""
+    first, second = (take(recorded(one, seed=k, name=f"run {k}"), OWNER) for k, one in enumerate((OWNER, rough(1.3))))
+    after_s = float(first.time_s[-1]) + first.period_s
+    later = replace(second, start=second.start._replace(time_s=second.start.time_s + after_s))
+    nominal = fit_nominal_parameters(dataset([first, later], OWNER))
+    found = changed(nominal, nominal.data.over([]))
+    assert found is not None
+    assert found.summary.moment_s == pytest.approx(float(later.time_s[0]), abs=0.5)
+    (friction,) = (one for one in found.summary.parameters if one.name == "coulomb_torque_n_m")
+    assert friction.values[1].value / friction.values[0].value == pytest.approx(1.3, rel=0.03)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 from diagnosis_runs import bench, dataset, fitted, recorded
@@ -24,6 +25,7 @@ COGGING, LOAD = Term("cogging_torque", 0, (0.3, 6.0, 0.2)), Term("constant_load"
 class Search:
     """What a search knows of the terms that were not named."""
 
+    prepared: Any = None
     rivals: dict[Any, list[RivalFit]] = field(default_factory=dict)
     needed: dict[Any, float] = field(default_factory=dict)
 
@@ -33,12 +35,12 @@ def test_a_term_that_hardly_stands_is_no_name() -> None:
     data = dataset([take(recorded(OWNER, COGGING, LOAD, seed=1), OWNER)], OWNER)
     final = fitted(Hypothesis(OWNER, (LOAD,)), data, evaluations=6)
     nominal, held_out = fitted(Hypothesis(OWNER), data, evaluations=6), data.over(())
-    proof = cross_validate(nominal, final, held_out)
+    proof, search = cross_validate(nominal, final, held_out), Search(SimpleNamespace(train=data, held_out=held_out))
     assert [one.term.effect for one in proof.ablations] == ["constant_load"]
-    (sure,) = confidences(Search(), proof.final, proof.ablations, held_out)  # type: ignore[arg-type]
+    (sure,) = confidences(search, proof.final, proof.ablations, held_out)  # type: ignore[arg-type]
     assert sure > CRITERIA.named
-    assert likely(Search(), nominal, proof, held_out).final is proof.final  # type: ignore[arg-type]
-    doubted = Search(needed={final.terms[0].key: 1.0})
+    assert likely(search, nominal, proof, held_out).final is proof.final  # type: ignore[arg-type]
+    doubted = replace(search, needed={final.terms[0].key: 1.0})
     (doubtful,) = confidences(doubted, proof.final, proof.ablations, held_out)  # type: ignore[arg-type]
     assert doubtful < CRITERIA.named
     kept = likely(doubted, nominal, proof, held_out)  # type: ignore[arg-type]

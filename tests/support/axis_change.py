@@ -32,10 +32,11 @@ def assert_change_is_told(folder: Path, at: int) -> None:
     assert not result.parameter_corrections  # none holds throughout
     write_diagnosis(found, folder)
     assert (folder / "change.png").is_file()
-    (panel,) = found.plot("change").axes
-    one_set, of_each_part = (line.get_ydata() for line in panel.lines[:2])
+    panels = found.plot("change").axes
+    assert len(panels) == len(found.reported.judged.change.runs)
+    one_set, of_each_part = (np.concatenate([panel.lines[at].get_ydata() for panel in panels]) for at in (0, 1))
     assert np.nanstd(of_each_part) < 0.2 * np.std(one_set)
-    assert "[N m]" in panel.get_ylabel()
+    assert all("[N m]" in panel.get_ylabel() for panel in panels)
     assert result.location is not None
     assert sum(phase.share for phase in result.location.phases) == pytest.approx(1.0)  # also if it is held out
     assert result.change.moment_s == pytest.approx(1e-3 * at, abs=0.1)

@@ -41,14 +41,15 @@ class Change:
         return all(fit.at_floor for fit in self.parts)
 
 
-def changed(nominal: Fit, held_out: Dataset) -> Change | None:
+def changed(nominal: Fit, held_out: Dataset, moves: bool) -> Change | None:
     """Find parameters of the axis that change between the recordings, or during one; None if none does.
 
-    `nominal` is the fit of one set of parameters to the recordings of training.
+    `nominal` is the fit of one set of parameters to the recordings of training. `moves`: the torque tells a moment of
+    change, by which a change below the noise of a row is one.
     """
     runs = (*nominal.data.runs, *held_out.runs)
-    ordered = in_turn(runs)
-    if ordered and (found := _changed_within(fit_nominal_parameters(nominal.data.over(ordered)))):
+    whole = fit_nominal_parameters(nominal.data.over(ordered)) if (ordered := in_turn(runs)) else None
+    if whole and (moves or whole.excess > 0.0) and (found := _changed_within(whole)):
         return found
     alone = _each(nominal.data, runs)
     if len(runs) > 1 and all(fit.at_floor for fit in alone):

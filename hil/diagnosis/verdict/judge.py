@@ -44,9 +44,11 @@ def judge(tested: Tested) -> Judged:
     held_out, law = searched.prepared.held_out, searched.prepared.law
     of_plant, change = verdict_on_plant(searched.given, searched.nominal, final, held_out), None
     named = of_plant is Verdict.MISSING_PHYSICS
-    moves = named and any(one.question.change for one in structure_left(final, held_out))  # beside all names
-    if (of_plant is Verdict.UNEXPLAINED or moves) and not searched.stopped_at:
-        change = _better(changed(refit.fit, held_out), searched.nominal, final, held_out)
+    open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
+    beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
+    moves = any(one.question.change for one in beside)
+    if open_ones or (moves and not searched.stopped_at):
+        change = _better(changed(refit.fit, held_out, moves), searched.nominal, final, held_out)
     if change and named and not _needs_less_torque(change, final):
         change = None
     if change and change.explains_all:

@@ -26,7 +26,7 @@ def rough(factor: float) -> Bench:
 def differing(*benches: Bench, terms: tuple[Term, ...] = ()) -> dict[str, tuple[float, ...]]:
     runs = [take(recorded(one, *terms, seed=k, name=f"run {k}"), OWNER) for k, one in enumerate(benches)]
     nominal = fit_nominal_parameters(dataset(runs, OWNER))
-    found = changed(nominal, nominal.data.over([]))
+    found = changed(nominal, nominal.data.over([]), True)
     return {one.name: tuple(value.value for value in one.values) for one in found.summary.parameters} if found else {}
 
 
@@ -48,7 +48,7 @@ def test_a_change_at_the_end_of_a_part_is_told_with_its_moment() -> None:
     after_s = float(first.time_s[-1]) + first.period_s
     later = replace(second, start=second.start._replace(time_s=second.start.time_s + after_s))
     nominal = fit_nominal_parameters(dataset([first, later], OWNER))
-    found = changed(nominal, nominal.data.over([]))
+    found = changed(nominal, nominal.data.over([]), True)
     assert found is not None
     assert found.summary.moment_s == pytest.approx(float(later.time_s[0]), abs=0.5)
     (friction,) = (one for one in found.summary.parameters if one.name == "coulomb_torque_n_m")

@@ -30,7 +30,10 @@ class Criteria:
     # one axis is below that. Below half of it nothing is left to explain.
     material: float = 0.02
     # Least share of the energy above the noise that a term removes, and the same beside `several` terms: many terms of
-    # less are a series expansion of another effect; if `several` are right, a further effect is all that is left.
+    # less are a series expansion of another effect; if `several` are right, a further effect is all that is left. Below
+    # this share of the first candidate's score one is not fitted, and below this share of a falling friction law's
+    # energy drag is part of its form: beside the best law fitted to an arctangent over 5 to 150 Stribeck velocities it
+    # takes up to 1.3 %.
     worth: float = 0.02
     series: float = 0.1
     several: int = 2
@@ -39,7 +42,6 @@ class Criteria:
     clear: float = 0.7  # cost with a term over that without it, below which its evidence needs no converged fit
     most_left: float = 0.5  # share of the energy above the noise; terms that leave more do not explain the mismatch
     in_vain: int = 3  # terms that leave more than `most_left`, after which the search ends
-    hopeless: float = 0.02  # score over that of the first candidate, below which a candidate is not fitted
     # A channel pays if its mean square grows by 10 % in rms, which is above a trade within the model discrepancy, and
     # by a tenth of all that the term explains: a real effect leaves the others a little wrong as long as something is
     # missing, one that only trades between channels loses as it gains.
@@ -69,9 +71,6 @@ class Criteria:
     # Largest mean square over noise on held-out recordings of a twin that lacks nothing: errors of fitted parameters
     # may leave as much rms there as the noise twice.
     elsewhere: float = 4.0
-    # Share of a falling friction law's energy up to which drag is part of its form. Beside the best law fitted to an
-    # arctangent over 5 to 150 Stribeck velocities drag takes up to 1.3 %.
-    part_of_form: float = 0.02
     change: float = 0.9  # of the energy above the noise that a change of the axis explains; less has another cause
     law_parts: float = 0.5  # of the mean square above the noise that further parts of a control law must remove
     setting: float = 1e-3  # relative change of a gain that is a correction: settings have three digits

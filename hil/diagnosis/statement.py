@@ -68,7 +68,7 @@ def _wandering(left: str) -> str:
 def _found(before: str, found: Sequence[Finding]) -> str:
     """What is there, in one sentence each; then what may be there, in one clause."""
     likely = [one for one in found if one.confidence >= CRITERIA.likely]
-    others = [one for one in found if one not in likely]
+    others = [one for one in found if one not in likely and one.confidence >= CRITERIA.named]
     perhaps = listed([f"{named(one)} ({percent(one.confidence)})" for one in others])
     if not likely:
         likely = [max(found, key=lambda one: one.confidence)]

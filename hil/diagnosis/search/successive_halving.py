@@ -47,7 +47,7 @@ def race(base: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
 
     The best is converged in all its variants, others only if their cost is near it.
     """
-    hopeful = [one for one in candidates[:_STARTED] if one.score >= CRITERIA.hopeless * candidates[0].score]
+    hopeful = [one for one in candidates[:_STARTED] if one.score >= CRITERIA.worth * candidates[0].score]
     return _Race(base, hopeful).run()
 
 

@@ -231,6 +231,6 @@ def form_of(searched: Searched, ablations: Sequence[Ablation]) -> dict[int, int]
         if law is None or any(rival.tied for rival in rivals_of(searched, ablation.term)):
             continue
         # in units of the energy with both
-        if ablation.train - 1.0 < CRITERIA.part_of_form * (ablations[law].train - 1.0):
+        if ablation.train - 1.0 < CRITERIA.worth * (ablations[law].train - 1.0):
             found[index] = law
     return found

@@ -178,7 +178,7 @@ def test_a_drag_that_may_be_something_else_is_told() -> None:
 def test_much_drag_is_a_cause_of_its_own() -> None:
     proof, forms, found = diagnosed((FALLING, drag(0.5)))
     smaller, larger = sorted(ablation.train - 1.0 for ablation in proof.ablations)
-    assert smaller > CRITERIA.part_of_form * larger
+    assert smaller > CRITERIA.worth * larger
     assert forms == {}
     assert sorted(finding.effect for finding in found) == ["nonlinear_viscous_friction", "stribeck_friction"]
     assert not any(finding.form for finding in found)
@@ -196,7 +196,7 @@ def test_much_drag_is_a_cause_of_its_own() -> None:
 def test_nothing_else_is_a_form_however_little_it_takes(terms: tuple[Term, ...]) -> None:
     proof, forms, found = diagnosed(terms)
     smaller, larger = sorted(ablation.train - 1.0 for ablation in proof.ablations)
-    assert smaller < CRITERIA.part_of_form * larger
+    assert smaller < CRITERIA.worth * larger
     assert forms == {}
     assert len(found) == 2
 

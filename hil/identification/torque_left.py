@@ -69,7 +69,7 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
 
 
 def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
-    """As `torque_missed`, without what white noise of the torque makes of it; 0 where it is infinite or not told."""
+    """Share of the torque that a twin misses (rms), less the white noise of the torque; 0 where it is not known."""
     missed = torque_missed(fit, data)
     plain = fit_plain(fit.data) if missed is not None else None
     if missed is None or plain is None or not math.isfinite(missed):

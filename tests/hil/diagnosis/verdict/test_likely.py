@@ -23,7 +23,7 @@ COGGING, LOAD = Term("cogging_torque", 0, (0.3, 6.0, 0.2)), Term("constant_load"
 
 @dataclass
 class Search:
-    """What a search knows of the terms that were not named."""
+    """Stands for a search: its recordings, the rivals of its terms, and the evidence for each term."""
 
     prepared: Any = None
     rivals: dict[Any, list[RivalFit]] = field(default_factory=dict)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from hil.diagnosis.moment_of_change import MomentOfChange, moment_of_change
 from hil.diagnosis.result import MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.measured import Measured
 from hil.identification.periods import strongest_periods
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import BINS, ResidualSeries
@@ -65,15 +63,6 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
         # friction of a load has its sign
         Question("load", hypothesis.bench.axis.drive_unit, length, by_load, 2 * BINS, range_, least),
     ]
-
-
-def in_turn(runs: Sequence[Measured]) -> list[Measured]:
-    """The runs in order of time; none unless each ends before the next begins, as parts of one recording do."""
-    if not all(run.time_s[run.evaluated].size for run in runs):
-        return []
-    ordered = sorted(runs, key=lambda run: float(run.time_s[run.evaluated][0]))
-    apart = all(one.time_s[one.evaluated][-1] <= two.time_s[two.evaluated][0] for one, two in pairwise(ordered))
-    return ordered if apart else []
 
 
 def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:

@@ -21,12 +21,11 @@ from hil.diagnosis.questions import (
     at_a_moment,
     everywhere,
     folded,
-    in_turn,
     over_time,
     strongest_line,
 )
 from hil.diagnosis.wording import by_chance
-from hil.identification.dataset import Dataset
+from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.plain_model import PlainModel

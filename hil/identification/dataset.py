@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -119,3 +120,12 @@ def prepare_dataset(runs: Sequence[Measured], bench: Bench) -> Dataset:
     wanted = wanted if all(run.observability.torque_measured for run in runs) else fastest_s
     observer_s = float(np.clip(wanted, fastest_s, max(SLOWEST_OBSERVER_S, fastest_s)))
     return Dataset(tuple(runs), bench, observer_s, max(float(np.ptp(run.position_command_m)) for run in runs))
+
+
+def in_turn(runs: Sequence[Measured]) -> list[Measured]:
+    """The runs in order of time; none unless each ends before the next begins, as parts of one recording do."""
+    if not all(run.time_s[run.evaluated].size for run in runs):
+        return []
+    ordered = sorted(runs, key=lambda run: float(run.time_s[run.evaluated][0]))
+    apart = all(one.time_s[one.evaluated][-1] <= two.time_s[two.evaluated][0] for one, two in pairwise(ordered))
+    return ordered if apart else []

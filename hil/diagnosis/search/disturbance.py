@@ -185,7 +185,8 @@ def force_windows(run: Measured, d: Disturbance, most: int = 3) -> list[tuple[fl
     """
     block = max(int(0.02 / run.period_s), 1)
     n = run.motor.size // block
-    mask = d.sliding[: n * block].reshape(n, block)
+    own = np.arange(run.motor.size) >= run.evaluated.start  # those before belong to another part
+    mask = (d.sliding & own)[: n * block].reshape(n, block)
     values = np.where(mask, d.torque[: n * block].reshape(n, block), 0.0).sum(axis=1)
     counts, scale, found = mask.sum(axis=1, dtype=np.float64), block * run.period_s, list[tuple[float, float, float]]()
     taken = np.zeros(n, dtype=bool)

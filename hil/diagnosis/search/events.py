@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from hil.arrays import FloatArray
-from hil.diagnosis.acceptance import is_event
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.event_detection import BLOCK_S, EDGE, Event, detect, faint, left_over
-from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import bic_gain
@@ -57,7 +55,7 @@ def beside_loads(nominal: Fit, fit: Fit) -> Fit:
 
 def revised(fit: Fit) -> Fit:
     """Fit the events of a fit again, also as they show beside its other terms; return the best."""
-    index = _index(fit)
+    index = event_index(fit)
     if index is None:
         return fit
     best = fit_windows(fit)
@@ -67,54 +65,10 @@ def revised(fit: Fit) -> Fit:
         other = fit.hypothesis.replaced(index, shown)
         again = fit_windows(fit.estimator.evaluate(other))
         best = again if bic_gain(again, best) > 0.0 else best
-    return _trimmed(_completed(best if best.cost <= fit.cost or bic_gain(best, fit) > 0.0 else fit))
+    return trimmed(completed(best if best.cost <= fit.cost or bic_gain(best, fit) > 0.0 else fit))
 
 
-def with_events_of(held_out: Dataset, final: Fit) -> Fit:
-    """Add the events of held-out recordings to a fit: its parameters and its own events stay.
-
-    They are those that the disturbance torque shows, beside the terms of the fit or beside the nominal twin, or those
-    of the training recordings at the same times, whichever the recordings support best. An event is no prediction: it
-    is found in each recording.
-    """
-    if not EVENTS or not held_out.runs:
-        return final
-    index, at = _index(final), final.hypothesis
-    there = replace(final.estimator, data=held_out)
-    before = there.evaluate(at)
-    if index is None and before.within_noise:
-        return final
-    choices = list[Term]()
-    plain = there.evaluate(at.without(*range(len(at.terms))))
-    # terms may depend on the motion, which strong events disturb: some show only beside the nominal twin
-    for beside in (before, plain) if at.terms else (before,):
-        if events := detect(beside):
-            choices += [event_term(effect, events, final.bench.axis.ratio_m_rad) for effect in EVENTS]
-    if index is not None:
-        windows = dict.fromkeys(one._replace(run=run.name) for run in held_out.runs for one in at.terms[index].windows)
-        choices.append(replace(at.resolved.terms[index], windows=tuple(windows)))
-    best, evidence = final, CRITERIA.evidence
-    for choice in choices:
-        longer = at.with_term(choice) if index is None else _joined(at, index, choice)
-        fitted = _completed(fit_windows(there.evaluate(longer), others=False), others=False)
-        fitted = _trimmed(fitted, others=False)
-        if _index(fitted) is None or fitted.hypothesis.x.size != longer.x.size:
-            continue
-        gain = bic_gain(fitted, before)
-        if (
-            gain > evidence
-            and before.cost - fitted.cost > CRITERIA.material * before.noise_energy
-            and is_event(inside_windows(fitted, before))
-        ):
-            own = final.estimator.residuals(fitted.hypothesis)
-            more = np.zeros((final.rows, fitted.hypothesis.x.size - at.x.size))
-            slopes = np.hstack([final.jacobian, more]) if final.jacobian.size else final.jacobian
-            best = replace(final, hypothesis=fitted.hypothesis, residuals=own, jacobian=slopes)
-            evidence = gain
-    return best
-
-
-def _joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
+def joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
     """The hypothesis with the windows of another term in one of its events."""
     term, mechanism = at.resolved.terms[index], BY_ID[at.terms[index].effect]
     (start, end), strength = mechanism.indices(Role.EDGE), mechanism.strength
@@ -130,15 +84,15 @@ def _joined(at: Hypothesis, index: int, more: Term) -> Hypothesis:
     return _with_windows(at, index, (*term.windows, *added))
 
 
-def _completed(fit: Fit, others: bool = True) -> Fit:
+def completed(fit: Fit, others: bool = True) -> Fit:
     """Add the windows that those of a fit leave, and make one of neighbours, where the evidence supports it."""
-    index = _index(fit)
+    index = event_index(fit)
     if index is None:
         return fit
     more = left_over(fit)
     if more:
         added = event_term(fit.terms[index].effect, more, fit.bench.axis.ratio_m_rad)
-        longer = _joined(fit.hypothesis, index, added)
+        longer = joined(fit.hypothesis, index, added)
         again = fit_windows(fit.estimator.evaluate(longer), others=others)
         fit = again if bic_gain(again, fit) > CRITERIA.evidence * len(more) else fit
     names, refuted = {run.name for run in fit.data.runs}, set[tuple[Window, Window]]()
@@ -172,18 +126,18 @@ def _with_windows(at: Hypothesis, index: int, windows: tuple[Window, ...]) -> Hy
     return Hypothesis(at.bench, terms, at.x)
 
 
-def _trimmed(fit: Fit, others: bool = True) -> Fit:
+def trimmed(fit: Fit, others: bool = True) -> Fit:
     """Leave out windows of the runs of a fit whose force is no larger than its error allows, and fit the others again.
 
     Such are windows at rest, where friction holds against a force. Faint ones and those without a length are left out
     too.
     """
-    index = _index(fit)
+    index = event_index(fit)
     if index is None:
         return fit
     term, names = fit.hypothesis.terms[index], {run.name for run in fit.data.runs}
     strength = BY_ID[term.effect].strength
-    errors = iter(window_errors(fit, index))
+    errors = iter(window_errors(fit, index, others))
     at = fit.hypothesis.resolved.terms[index]
     inside = [one for one in term.windows if one.run in names]
     weak = dict(zip(inside, faint([(*at.edges(one), at.at(one)[strength]) for one in inside]), strict=True))
@@ -223,7 +177,7 @@ class InsideWindows(NamedTuple):
 
 def inside_windows(fit: Fit, base: Fit) -> InsideWindows | None:
     """Measure what the force of a fit leaves within its windows; None without one. `base` is the fit without it."""
-    index = _index(fit)
+    index = event_index(fit)
     if index is None:
         return None
     start, end = BY_ID[fit.terms[index].effect].indices(Role.EDGE)
@@ -269,5 +223,5 @@ def _one_push(term: Term) -> bool:
     return len({one.run for one in term.windows}) == 1 and bool(np.all(gaps_s < EDGE * BLOCK_S))
 
 
-def _index(fit: Fit) -> int | None:
+def event_index(fit: Fit) -> int | None:
     return next((index for index, term in enumerate(fit.hypothesis.terms) if term.windows), None)

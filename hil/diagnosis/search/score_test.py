@@ -18,6 +18,7 @@ from scipy.linalg import qr
 from hil.arrays import FloatArray
 from hil.diagnosis.search.event_detection import detect
 from hil.diagnosis.search.events import EVENTS, event_term
+from hil.diagnosis.search.force_windows import torque_windows
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -140,7 +141,7 @@ def screen_library(base: Fit) -> list[Candidate]:
 
 
 def _events(base: Fit) -> list[StartPoint]:
-    """The start of all events that the disturbance torque shows, as one term."""
+    """The starts of all events that the disturbance torque shows, and of those that least squares tell, as terms."""
     if any(term.windows for term in base.terms):
         return []
     # events may have led the fitted parameters astray, those of the bench file may be wrong
@@ -148,6 +149,8 @@ def _events(base: Fit) -> list[StartPoint]:
     shown = [(one, events) for one in points if (events := detect(one))]
     pairs = [(one, event_term(effect, events, ratio)) for one, events in shown for effect in EVENTS]
     terms = [term for _, term in sorted(pairs, key=lambda pair: _criterion(*pair))[:1]]
+    told = torque_windows(base, base.data)
+    terms += [event_term(effect, told, ratio) for effect in EVENTS if told]
     return [
         StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
         for term in terms

@@ -7,11 +7,10 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.questions import in_turn
 from hil.diagnosis.result import AxisChange, ChangedParameter
 from hil.diagnosis.value import Value
 from hil.diagnosis.wording import whole_name
-from hil.identification.dataset import Dataset
+from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.inference import standard_errors
 from hil.identification.measured import SETTLE_IN_MOTION_S, Measured

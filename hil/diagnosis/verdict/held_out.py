@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.search.events import with_events_of
+from hil.diagnosis.search.events_everywhere import with_events
 from hil.diagnosis.search.forward_selection import carried, claimed, over
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
-from hil.diagnosis.verdict.cross_validation import CrossValidation, cross_validate
+from hil.diagnosis.verdict.cross_validation import CrossValidation, Rivals, cross_validate
 from hil.diagnosis.verdict.findings import confidences, form_of, renamed, rivals_of
 from hil.diagnosis.verdict.refit import reported_refit
 from hil.identification.dataset import Dataset
@@ -25,18 +25,18 @@ def test_on_held_out(searched: Searched) -> Tested:
     """
     nominal, held_out, final = searched.nominal, searched.prepared.held_out, renamed(searched.final)
     if not searched.stopped_at or any(term.windows for term in final.terms):
-        final = with_events_of(held_out, final)
+        final = with_events(final, held_out)
     final = with_own_noise(final, held_out)
     data, plain = final.data, fit_plain(final.data)
     rivals = {term.key: rivals_of(searched, term) for term in final.terms}
     if data is searched.prepared.train:
-        return _tested(searched, likely(searched, nominal, cross_validate(nominal, final, held_out, rivals), held_out))
+        return _tested(searched, _proof(searched, nominal, final, held_out, rivals))
     there = held_out.louder(data.set_aside)
     if data.apart and plain:  # by a twin that holds the motion
         reference = nominal if nominal.within_noise else final
         there = noise_apart(there, reference.hypothesis, plain)
     base = over(data, nominal)
-    proof = likely(searched, base, cross_validate(base, final, there, rivals), there)
+    proof = _proof(searched, base, final, there, rivals)
     return _tested(searched, replace(proof, final=carried(searched.prepared.train, proof.final)))
 
 
@@ -50,6 +50,18 @@ def with_own_noise(fit: Fit, held_out: Dataset) -> Fit:
         return fit
     known = fit.data.set_aside
     return over(fit.data.louder({**known, _TABLE: known.get(_TABLE, 1.0) * ratio**0.5}), fit)
+
+
+def _proof(searched: Searched, nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals) -> CrossValidation:
+    """Test terms; where some are dropped, with the events that show beside the others."""
+    proof = likely(searched, nominal, cross_validate(nominal, final, held_out, rivals), held_out)
+    if searched.stopped_at or not proof.dropped:
+        return proof
+    more = with_events(proof.final, held_out)
+    if more is proof.final:
+        return proof
+    again = likely(searched, nominal, cross_validate(nominal, more, held_out, proof.rivals), held_out)
+    return replace(again, dropped=(*proof.dropped, *again.dropped))
 
 
 def _tested(searched: Searched, proof: CrossValidation) -> Tested:

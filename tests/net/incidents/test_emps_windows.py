@@ -13,7 +13,8 @@ from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.preparation.split import split
 from hil.diagnosis.search.event_detection import detect
-from hil.diagnosis.search.events import event_term, with_events_of
+from hil.diagnosis.search.events import event_term
+from hil.diagnosis.search.events_everywhere import with_events
 from hil.identification.dataset import prepare_dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import take
@@ -65,7 +66,7 @@ def test_windows_in_emps_are_found_at_once(pushes: list[Push]) -> None:
 
 def test_windows_of_the_held_out_part_are_found_there() -> None:
     nominal, _, held_out, there = prepared(regular(4, 60.0, 17.4, 24.0))
-    found = with_events_of(there.data, nominal)
+    found = with_events(nominal, there.data)
     assert_found(windows(found), held_out)
     assert found.cost == pytest.approx(nominal.cost)
 
@@ -73,7 +74,7 @@ def test_windows_of_the_held_out_part_are_found_there() -> None:
 def test_many_windows_of_any_height_do_not_count_as_noise() -> None:
     """The nominal twin lacks the offset of this axis, 3 N. Two of the weakest windows, 20 and 31 N, may be lost."""
     nominal, _, held_out, there = prepared(irregular(30, 5, 17.2, 24.3))
-    found = windows(with_events_of(there.data, nominal))
+    found = windows(with_events(nominal, there.data))
     assert len(held_out) - 2 <= len(found) <= len(held_out)
     for start_s, end_s, force_n in found:
         (push,) = [one for one in held_out if one.start_s < (start_s + end_s) / 2.0 < one.end_s]
@@ -91,12 +92,12 @@ def test_a_window_about_a_reversal_is_found_beside_others() -> None:
         [Push(17.4, 17.6, 60.0), Push(reversal_s - 0.04, reversal_s + 0.03, -50.0), Push(20.5, 20.8, 60.0)]
     )
     assert [event.level > 0.0 for event in detect(there)] == [True, True]
-    assert_found(windows(with_events_of(there.data, nominal)), held_out)
+    assert_found(windows(with_events(nominal, there.data)), held_out)
 
 
 def test_without_an_event_the_held_out_part_of_emps_gets_none() -> None:
     nominal, *_, there = prepared([])
-    assert with_events_of(there.data, nominal) is nominal
+    assert with_events(nominal, there.data) is nominal
 
 
 def test_faint_windows_are_left_for_later() -> None:

@@ -8,7 +8,8 @@ from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 from emps_windows import EDGE_S, windows
 
 from hil.diagnosis.search.event_detection import detect
-from hil.diagnosis.search.events import event_term, with_events_of
+from hil.diagnosis.search.events import event_term
+from hil.diagnosis.search.events_everywhere import with_events
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
 from hil.identification.terms import Term
@@ -31,7 +32,7 @@ def test_a_window_of_the_held_out_part_is_found_there() -> None:
     plain = fitted(Hypothesis(OWNER), [take(recorded(OWNER, times=3), OWNER)])
     push = Term("external_force", 0, (150.0, 0.4, 0.7))
     pushed = take(recorded(OWNER, push, seed=2, name="other", times=3), OWNER)
-    found = with_events_of(dataset([pushed], OWNER), plain)
+    found = with_events(plain, dataset([pushed], OWNER))
     ((start_s, end_s, force_n),) = windows(found)
     assert (start_s, end_s) == pytest.approx((0.4, 0.7), abs=EDGE_S)
     assert force_n == pytest.approx(150.0, rel=0.02)
@@ -55,4 +56,4 @@ def test_edges_of_a_window_are_where_the_axis_moves() -> None:
 def test_without_an_event_the_held_out_part_gets_none() -> None:
     run = take(recorded(OWNER), OWNER)
     plain = fitted(Hypothesis(OWNER), [run])
-    assert with_events_of(dataset([take(recorded(OWNER, seed=2), OWNER)], OWNER), plain) is plain
+    assert with_events(plain, dataset([take(recorded(OWNER, seed=2), OWNER)], OWNER)) is plain

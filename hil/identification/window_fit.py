@@ -69,16 +69,15 @@ def fit_windows(fit: Fit, evaluations: int = 16, others: bool = True) -> Fit:
     return estimator.fit(_referred(at, index), evaluations=4) if others else estimator.evaluate(at)
 
 
-def window_errors(fit: Fit, index: int, others: bool = True) -> FloatArray:
+def window_errors(fit: Fit, index: int) -> FloatArray:
     """Standard errors (w, 3) of start, end and strength of the windows of a term in the runs of a fit.
 
-    Beside the other parameters of the fit, or (not `others`) at their values, which other recordings tell. An edge at
-    rest, where friction holds the force, may lie anywhere there: its error is at least `_free_shifts`.
+    An edge at rest, where friction holds the force, may lie anywhere there: its error is at least `_free_shifts`.
     """
     at = fit.hypothesis.rebased
     inside = _inside(fit.estimator, at.terms[index])
     edges = _window_slopes(fit.estimator, at, index).toarray()
-    both = np.hstack([_other_slopes(fit.estimator, at, index), edges]) if others else edges
+    both = np.hstack([_other_slopes(fit.estimator, at, index), edges])
     errors = sandwich(both, fit.residuals)[-3 * len(inside) :].reshape(3, -1).T
     term = at.resolved.terms[index]
     strength = abs(term.values[BY_ID[term.effect].strength])

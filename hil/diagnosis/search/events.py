@@ -137,7 +137,7 @@ def trimmed(fit: Fit, others: bool = True) -> Fit:
         return fit
     term, names = fit.hypothesis.terms[index], {run.name for run in fit.data.runs}
     strength = BY_ID[term.effect].strength
-    errors = iter(window_errors(fit, index, others))
+    errors = iter(window_errors(fit, index))
     at = fit.hypothesis.resolved.terms[index]
     inside = [one for one in term.windows if one.run in names]
     weak = dict(zip(inside, faint([(*at.edges(one), at.at(one)[strength]) for one in inside]), strict=True))

@@ -2,10 +2,11 @@
 
     T = A b + a 1(t1 <= t < t2) + e,    t1 and t2 where the sum of squares of e is least
 
-T is the torque, measured or needed beyond that of a twin, A the columns of the plain model and the speed without its
-sign. With the error s of the jackknife over blocks a / s is Student's t of as many blocks less one; each pair of
-moments is one question more (G. C. Chow, Econometrica 28 (1960) 591, with two unknown moments). What a twin lacks comes
-again with the motion, in most blocks, and so enlarges s; what happens once does not.
+T is the torque, measured or needed beyond that of a twin, A the columns of the plain model, the speed without its sign,
+and slow cosines over time, since a torque wanders. With the error s of the jackknife over blocks a / s is Student's t
+of as many blocks less one; each pair of moments is one question more (G. C. Chow, Econometrica 28 (1960) 591, with two
+unknown moments). What a twin lacks comes again with the motion, in most blocks, and so enlarges s; what happens once
+does not.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from hil.diagnosis.search.event_detection import Event
 from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.least_squares import least_squares
+from hil.identification.least_squares import Estimate, least_squares
 from hil.identification.measured import Measured
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries
@@ -31,7 +32,8 @@ from hil.identification.whitening import RANK
 _STEPS = 200  # of the rows in order of time, between which edges are sought
 _BLOCKS = 20  # of the jackknife
 _SHORTEST = 2 * _STEPS // _BLOCKS  # steps: a window covers one block, and rows of others
-_TOLD = 0.02  # of the power of a window: below, the other columns do what it does
+_TOLD = 0.05  # of the power of a window: below, the other columns do what it does
+_SLOW = 6  # half periods of a wander of the torque over the recording
 _MOST = 4  # windows of a recording
 
 
@@ -75,8 +77,7 @@ def _of_group(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[
 
 
 def windows_of(runs: Sequence[Measured], series: Sequence[ResidualSeries], ratio: float | None) -> list[ForceWindow]:
-    """Windows of a torque (n,) of runs, best first; each is told beside those before it, and beside a torque over the
-    position.
+    """Windows of a torque (n,) of runs; each is told beside the others, and beside a torque over the position.
 
     `ratio` [load rad per motor rad] is that of a load that turns.
     """
@@ -92,24 +93,42 @@ def windows_of(runs: Sequence[Measured], series: Sequence[ResidualSeries], ratio
     table = np.column_stack(
         [np.concatenate([one[name][at] for one, at in zip(columns, rows, strict=True)]) for name in columns[0]]
     )
+    table = np.column_stack([table, _wander(time_s)])
     edges = np.linspace(0, torque.size, _STEPS + 1).astype(int)
-    found, taken = list[ForceWindow](), np.zeros(_STEPS, dtype=bool)
-    while len(found) < _MOST:
-        first, last = _most_explained(table, torque, edges, taken)
+    names = {f"{number}": column for number, column in enumerate(table.T)}
+    found, taken = dict[tuple[int, int], FloatArray](), np.zeros(_STEPS, dtype=bool)
+    for _ in range(_MOST):  # a window that is left counts as noise of the others
+        first, last = _most_explained(np.column_stack([table, *found.values()]), torque, edges, taken)
         taken[first:last] = True
-        first, last = int(edges[first]), int(edges[last])
         inside = np.zeros(torque.size)
-        inside[first:last] = 1.0
-        names = {f"{number}": column for number, column in enumerate(table.T)}
-        force = least_squares({**names, "force": inside}, torque, blocks=_BLOCKS)["force"]
-        if not np.isfinite(force.std_error) or not force.std_error > 0.0:
-            break
-        chance = 2.0 * float(student.sf(abs(force.value) / force.std_error, _BLOCKS - 1)) * _STEPS**2 / 2.0
-        if not chance < CRITERIA.significance:
-            break
-        found.append(_shorter(ForceWindow(float(time_s[first]), float(time_s[last - 1]), force.value, chance), time_s))
-        table = np.column_stack([table, inside])
-    return found
+        inside[edges[first] : edges[last]] = 1.0
+        found[int(edges[first]), int(edges[last])] = inside
+    while found:
+        fit = least_squares({**names, **{str(rows): one for rows, one in found.items()}}, torque, blocks=_BLOCKS)
+        told = {rows: _chance(fit[str(rows)]) for rows in found}
+        least = max(told, key=lambda rows: told[rows])
+        if told[least] < CRITERIA.significance:
+            windows = (
+                ForceWindow(float(time_s[first]), float(time_s[last - 1]), fit[str((first, last))].value, chance)
+                for (first, last), chance in told.items()
+            )
+            return [_shorter(one, time_s) for one in windows]
+        del found[least]
+    return []
+
+
+def _chance(force: Estimate) -> float:
+    """Chance of a force, of as many questions as there are windows; 1 where it is not told."""
+    if not (np.isfinite(force.std_error) and force.std_error > 0.0):
+        return 1.0
+    once = 2.0 * float(student.sf(abs(force.value) / force.std_error, _BLOCKS - 1))
+    return min(once * _STEPS**2 / 2.0, 1.0)
+
+
+def _wander(time_s: FloatArray) -> FloatArray:
+    """Cosines (n, k) over time, of a torque that wanders slowly; a force begins and ends at once."""
+    phase = np.pi * (time_s - time_s[0]) / max(float(np.ptp(time_s)), 1e-300)
+    return np.cos(np.outer(phase, np.arange(1, _SLOW + 1)))
 
 
 def _shorter(window: ForceWindow, time_s: FloatArray) -> ForceWindow:

@@ -10,6 +10,8 @@ does not.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -22,10 +24,11 @@ from hil.diagnosis.search.event_detection import Event
 from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.least_squares import Estimate, least_squares
+from hil.identification.least_squares import Estimate, LinearFit, least_squares
 from hil.identification.measured import Measured
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries
+from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
 from hil.identification.whitening import RANK
 
@@ -35,6 +38,7 @@ _SHORTEST = 2 * _STEPS // _BLOCKS  # steps: a window covers one block, and rows 
 _TOLD = 0.05  # of the power of a window: below, the other columns do what it does
 _SLOW = 6  # half periods of a wander of the torque over the recording
 _MOST = 4  # windows of a recording
+CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
 
 
 class ForceWindow(NamedTuple):
@@ -54,81 +58,130 @@ def torque_windows(fit: Fit, data: Dataset) -> list[Event]:
     plain = fit_plain(fit.data) if data.observability.torque_measured else None
     if plain is None:
         return []
+    found = list[Event]()
+    for group in _groups(data):
+        told = [windows_of(one) for one in _seen(fit.hypothesis, data.over(group), plain)]
+        best = min(told, key=lambda windows: min((one.p for one in windows), default=1.0), default=[])
+        for one, run in product(best, group):
+            first_s, last_s = run.time_s[run.evaluated][[0, -1]].tolist()
+            begin_s, end_s = max(one.start_s, first_s), min(one.end_s, last_s)
+            if begin_s < end_s:
+                found.append(Event(run.name, begin_s, end_s, -one.level))
+    return found
+
+
+def strength_told(without: Fit, term: Term, data: Dataset) -> bool:
+    """True if the torque of recordings tells one of the long windows of an event, beside the twin of a fit without it.
+
+    Else it is a torque that wanders. True also where none is long, or there is no torque: then it is not asked.
+    """
+    plain = fit_plain(without.data) if data.observability.torque_measured else None
+    chances = [1.0]
+    for group in _groups(data) if plain else ():
+        part = data.over(group)
+        edges = [term.edges(one) for one in term.windows if one.run in {run.name for run in group}]
+        for seen in _seen(without.hypothesis, part, plain) if plain and edges else ():
+            inside = [seen.inside(*one) for one in _whole(edges)]
+            fit = seen.fit(inside)
+            long = [at for at, one in enumerate(inside) if one.sum() * _STEPS >= _SHORTEST * one.size]
+            chances += [_once(fit[f"force {at}"]) for at in long]
+    return len(chances) == 1 or min(chances) < CRITERIA.significance
+
+
+def _groups(data: Dataset) -> list[list[Measured]]:
+    """The parts of one recording, in order of time, or each recording."""
     ordered = in_turn(data.runs)
-    groups = [ordered] if ordered else [[run] for run in data.runs]
-    return [event for group in groups for event in _of_group(fit.hypothesis, data.over(group), plain)]
+    return [ordered] if ordered else [[run] for run in data.runs]
 
 
-def _of_group(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Event]:
-    """Events of runs that are parts of one recording, in order of time."""
+def _whole(edges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Windows (start, end) in order of time; those that a cut of the recording parts are one."""
+    found = list[tuple[float, float]]()
+    for start_s, end_s in sorted(edges):
+        if found and start_s - found[-1][1] < CUT_S:
+            found[-1] = found[-1][0], max(end_s, found[-1][1])
+        else:
+            found.append((start_s, end_s))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Torque:
+    """A torque (n,) at times (n,) where the axis slides, and what else acts: columns (n, k)."""
+
+    time_s: FloatArray
+    torque: FloatArray
+    table: FloatArray
+
+    def inside(self, start_s: float, end_s: float) -> FloatArray:
+        """1 in a window, 0 outside of it (n,)."""
+        return ((self.time_s >= start_s) & (self.time_s <= end_s)).astype(np.float64)
+
+    def fit(self, windows: Sequence[FloatArray]) -> LinearFit:
+        """Least squares with the forces in windows (n,), named by their number."""
+        columns = {f"{number}": column for number, column in enumerate(self.table.T)}
+        forces = {f"force {number}": one for number, one in enumerate(windows)}
+        return least_squares({**columns, **forces}, self.torque, blocks=_BLOCKS)
+
+
+def _seen(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[_Torque]:
+    """The torque of runs in order of time, needed beyond a twin and measured, as far as there are rows enough."""
     needed = needed_torque(hypothesis, data, plain)
     motions = [measured_motion(run) for run in data.runs]
-    measured = [ResidualSeries(one.torque, series.rows) for one, series in zip(motions, needed, strict=True)]
     ratio = data.bench.axis.ratio_m_rad if data.bench.axis.turns else None
-    found = [windows_of(data.runs, series, ratio) for series in (needed, measured)]
-    best = min(found, key=lambda windows: min((one.p for one in windows), default=1.0))
-    return [
-        Event(run.name, max(one.start_s, first_s), min(one.end_s, last_s), -one.level)
-        for one in best
-        for run in data.runs
-        for first_s, last_s in [tuple(run.time_s[run.evaluated][[0, -1]])]
-        if max(one.start_s, first_s) < min(one.end_s, last_s)
-    ]
+    measured = [ResidualSeries(one.torque, series.rows) for one, series in zip(motions, needed, strict=True)]
+    found = [torque_over_time(data.runs, series, ratio) for series in (needed, measured)]
+    return [one for one in found if one.torque.size >= 2 * _STEPS and np.isfinite(one.torque).all()]
 
 
-def windows_of(runs: Sequence[Measured], series: Sequence[ResidualSeries], ratio: float | None) -> list[ForceWindow]:
-    """Windows of a torque (n,) of runs; each is told beside the others, and beside a torque over the position.
+def torque_over_time(runs: Sequence[Measured], series: Sequence[ResidualSeries], ratio: float | None) -> _Torque:
+    """The torque of runs beside the plain model, a torque over the position, and a slow wander.
 
     `ratio` [load rad per motor rad] is that of a load that turns.
     """
-    moved = [measured_motion(run).moved for run in runs]
     rows = [one.rows for one in series]
     time_s, torque = (
         np.concatenate([one[at] for one, at in zip(each, rows, strict=True)])
         for each in ([run.time_s for run in runs], [one.left for one in series])
     )
-    if torque.size < 2 * _STEPS or not np.isfinite(torque).all():
-        return []
+    moved = [measured_motion(run).moved for run in runs]
     columns = [{**plain_columns(one, ratio, spring=True), "speed": np.abs(one.velocity)} for one in moved]
     table = np.column_stack(
         [np.concatenate([one[name][at] for one, at in zip(columns, rows, strict=True)]) for name in columns[0]]
     )
-    table = np.column_stack([table, _wander(time_s)])
-    edges = np.linspace(0, torque.size, _STEPS + 1).astype(int)
-    names = {f"{number}": column for number, column in enumerate(table.T)}
-    found, taken = dict[tuple[int, int], FloatArray](), np.zeros(_STEPS, dtype=bool)
+    phase = np.pi * (time_s - time_s[:1]) / max(float(np.ptp(time_s)) if time_s.size else 0.0, 1e-300)
+    return _Torque(time_s, torque, np.column_stack([table, np.cos(np.outer(phase, np.arange(1, _SLOW + 1)))]))
+
+
+def windows_of(seen: _Torque) -> list[ForceWindow]:
+    """Windows of a torque; each is told beside the others."""
+    edges = np.linspace(0, seen.torque.size, _STEPS + 1).astype(int)
+    found, taken = list[FloatArray](), np.zeros(_STEPS, dtype=bool)
     for _ in range(_MOST):  # a window that is left counts as noise of the others
-        first, last = _most_explained(np.column_stack([table, *found.values()]), torque, edges, taken)
+        first, last = _most_explained(np.column_stack([seen.table, *found]), seen.torque, edges, taken)
         taken[first:last] = True
-        inside = np.zeros(torque.size)
-        inside[edges[first] : edges[last]] = 1.0
-        found[int(edges[first]), int(edges[last])] = inside
+        found.append(np.zeros(seen.torque.size))
+        found[-1][edges[first] : edges[last]] = 1.0
     while found:
-        fit = least_squares({**names, **{str(rows): one for rows, one in found.items()}}, torque, blocks=_BLOCKS)
-        told = {rows: _chance(fit[str(rows)]) for rows in found}
-        least = max(told, key=lambda rows: told[rows])
-        if told[least] < CRITERIA.significance:
-            windows = (
-                ForceWindow(float(time_s[first]), float(time_s[last - 1]), fit[str((first, last))].value, chance)
-                for (first, last), chance in told.items()
-            )
-            return [_shorter(one, time_s) for one in windows]
-        del found[least]
+        fit = seen.fit(found)
+        forces = [fit[f"force {at}"] for at in range(len(found))]
+        chances = [min(_once(force) * _STEPS**2 / 2.0, 1.0) for force in forces]
+        if max(chances) < CRITERIA.significance:
+            ends = [seen.time_s[inside > 0.0] for inside in found]
+            windows = zip(ends, forces, chances, strict=True)
+            return [
+                _shorter(ForceWindow(float(at[0]), float(at[-1]), force.value, p), seen.time_s)
+                for at, force, p in windows
+            ]
+        del found[int(np.argmax(chances))]
     return []
 
 
-def _chance(force: Estimate) -> float:
-    """Chance of a force, of as many questions as there are windows; 1 where it is not told."""
+def _once(force: Estimate) -> float:
+    """Chance of a force in a window that is given; 1 where it is not told."""
     if not (np.isfinite(force.std_error) and force.std_error > 0.0):
         return 1.0
-    once = 2.0 * float(student.sf(abs(force.value) / force.std_error, _BLOCKS - 1))
-    return min(once * _STEPS**2 / 2.0, 1.0)
-
-
-def _wander(time_s: FloatArray) -> FloatArray:
-    """Cosines (n, k) over time, of a torque that wanders slowly; a force begins and ends at once."""
-    phase = np.pi * (time_s - time_s[0]) / max(float(np.ptp(time_s)), 1e-300)
-    return np.cos(np.outer(phase, np.arange(1, _SLOW + 1)))
+    return 2.0 * float(student.sf(abs(force.value) / force.std_error, _BLOCKS - 1))
 
 
 def _shorter(window: ForceWindow, time_s: FloatArray) -> ForceWindow:

@@ -18,6 +18,7 @@ from hil.diagnosis.acceptance import HELD_OUT, NEEDED
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition, Harm, harm, torque_of
+from hil.diagnosis.search.force_windows import strength_told
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.rivals import ENDED, RivalFit
 from hil.diagnosis.verdict.noise_free import energy_without_noise
@@ -150,6 +151,13 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
     own_held_out = final.on(held_out) if held_out.runs else None
     differs = unrepeated(final.hypothesis, final.data)
 
+    every = final.data.over((*final.data.runs, *held_out.runs))
+
+    def clear(index: int, term: Term, other: Fit) -> bool:
+        if term.windows and not strength_told(other, term, every):
+            return False
+        return not final.jacobian.size or strength_over_error(final, index) > 1.0  # without a Jacobian it is not told
+
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
         there = other.on(held_out) if held_out.runs else None
         least = _LEAST if other.within_noise else 1.0  # there the shape has shown that it is no noise
@@ -172,7 +180,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
-            not final.jacobian.size or strength_over_error(final, index) > 1.0,  # without a Jacobian it is not told
+            clear(index, term, other),
             _quiet(final, other),
             torque_of(final, other, term, held_out, given),
             harm(final, other, given),

@@ -11,6 +11,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import EventWindow, PulseTrain
+from hil.diagnosis.search.force_windows import CUT_S
 from hil.diagnosis.turning import of_load
 from hil.diagnosis.value import Value
 from hil.diagnosis.wording import unit_in, value_in_words
@@ -28,7 +29,6 @@ _REGULAR_S = 0.005  # largest deviation of an edge from a period: a controlled e
 _LEAST_ERROR_S = 1e-4  # of an edge in the fit of a period: ten times finer than the rows of a recording at 1 kHz
 _FEWEST = 3  # windows of a train: two always have a period
 _RAMP = 1.0 / 3.0  # of the impulse of a push
-_CUT_S = 0.15  # at the cut of a recording: rows at rest or not evaluated
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def _continues(before: Seen, after: Seen) -> bool:
     last_s, first_s = before.run.time_s[-1], after.run.time_s[after.run.evaluated.start]
     cut_s, period_s = after.run.start.time_s, after.run.period_s
     following = before.run is not after.run and cut_s - 2.0 * period_s < last_s < max(cut_s, first_s) + 2.0 * period_s
-    near = abs(before.values[1] - last_s) < _CUT_S and abs(after.values[0] - first_s) < _CUT_S
+    near = abs(before.values[1] - last_s) < CUT_S and abs(after.values[0] - first_s) < CUT_S
     return following and near and before.values[2] * after.values[2] > 0.0
 
 

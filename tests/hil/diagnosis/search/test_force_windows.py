@@ -14,11 +14,11 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.diagnosis.search.event_detection import Event
 from hil.diagnosis.search.events_everywhere import with_events
-from hil.diagnosis.search.force_windows import torque_windows, windows_of
+from hil.diagnosis.search.force_windows import strength_told, torque_over_time, torque_windows, windows_of
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured, take
 from hil.identification.structure import ResidualSeries
-from hil.identification.terms import Term
+from hil.identification.terms import Term, Window
 from hil.identification.torque_left import fit_plain, measured_motion
 
 OWNER = bench()
@@ -41,7 +41,7 @@ def slow_noise(size: float, seed: int) -> FloatArray:
 
 def told(torque: FloatArray, run: Measured = RUN) -> list[tuple[float, float, float]]:
     """Windows of a torque (n,) of a run: start, end [s], torque needed [N m]."""
-    found = windows_of([run], [ResidualSeries(torque, SLIDING)], None)
+    found = windows_of(torque_over_time([run], [ResidualSeries(torque, SLIDING)], None))
     return [(one.start_s, one.end_s, one.level) for one in found]
 
 
@@ -93,9 +93,11 @@ def test_windows_are_apart_and_the_shorter_side_of_a_step_is_the_window() -> Non
 
 
 def test_few_rows_and_values_that_are_no_numbers_tell_nothing() -> None:
-    few = SLIDING & (np.cumsum(SLIDING) < 100)
-    assert windows_of([RUN], [ResidualSeries(MOTION.torque, few)], None) == []
-    assert told(np.full(MOTION.torque.size, np.nan)) == []
+    still = replace(RUN, motor=np.full(RUN.motor.size, RUN.motor[0]))
+    fit = evaluated(Hypothesis(OWNER), dataset([RUN], OWNER))
+    assert torque_windows(fit, fit.data.over([still])) == []
+    unknown = replace(RUN, torque=np.full(RUN.torque.size, np.nan))
+    assert torque_windows(fit, fit.data.over([unknown])) == []
 
 
 def parts(run: Measured, share: float) -> tuple[Measured, Measured]:
@@ -132,3 +134,16 @@ def test_events_carry_the_force_on_the_axis_and_not_the_torque_that_the_drive_ne
     events: list[Event] = torque_windows(fit, fit.data.over([first, last]))
     ratio = OWNER.axis.ratio_m_rad
     assert [one.level / ratio for one in events] == pytest.approx([300.0], rel=0.2)
+
+
+def test_a_long_window_is_an_event_only_where_the_torque_tells_it_beside_a_slow_wander() -> None:
+    push = (300.0, 0.3 * DURATION_S, 0.5 * DURATION_S)
+    for number, told_so in ((1.0, True), (0.0, False)):
+        first, last = pushed(number * push[0], *push[1:])
+        without = evaluated(Hypothesis(OWNER), dataset([first], OWNER))
+        names = ((first.name, push[1:]), (last.name, push[1:]))
+        windows = tuple(Window(name) for name, _ in names)
+        term = Term("external_force", 0, push, windows=windows)
+        assert strength_told(without, term, without.data.over([first, last])) == told_so
+    short = replace(term, values=(300.0, 1.0, 1.05))
+    assert strength_told(without, short, without.data.over([first, last]))  # not asked

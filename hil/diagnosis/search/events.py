@@ -38,6 +38,12 @@ def event_term(effect: str, events: Sequence[Event], ratio: float) -> Term:
     return Term(effect, 0, tuple(values), windows=windows)
 
 
+def information_criterion(at: Fit, event: Term) -> float:
+    """Bayesian information criterion of an event at the parameters of a fit: three values for each window."""
+    begun = at.estimator.evaluate(at.hypothesis.with_term(event))
+    return float(begun.rows * np.log(begun.cost) + 3 * len(event.windows) * np.log(begun.rows))
+
+
 def beside_loads(nominal: Fit, fit: Fit) -> Fit:
     """Fit the nominal parameters beside the loads of another fit (events, weight, spring, gravity): what the other
     terms are measured against. A load does not move with the speed, so nothing that it leaves is friction.

@@ -17,7 +17,7 @@ from scipy.linalg import qr
 
 from hil.arrays import FloatArray
 from hil.diagnosis.search.event_detection import detect
-from hil.diagnosis.search.events import EVENTS, event_term
+from hil.diagnosis.search.events import EVENTS, event_term, information_criterion
 from hil.diagnosis.search.force_windows import torque_windows
 from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
 from hil.identification.estimator import Fit
@@ -148,7 +148,7 @@ def _events(base: Fit) -> list[StartPoint]:
     points, ratio = (base, base.estimator.evaluate(base.hypothesis.given)), base.bench.axis.ratio_m_rad
     shown = [(one, events) for one in points if (events := detect(one))]
     pairs = [(one, event_term(effect, events, ratio)) for one, events in shown for effect in EVENTS]
-    terms = [term for _, term in sorted(pairs, key=lambda pair: _criterion(*pair))[:1]]
+    terms = [term for _, term in sorted(pairs, key=lambda pair: information_criterion(*pair))[:1]]
     told = torque_windows(base, base.data)
     terms += [event_term(effect, told, ratio) for effect in EVENTS if told]
     return [
@@ -156,12 +156,6 @@ def _events(base: Fit) -> list[StartPoint]:
         for term in terms
         if offered(term, base.hypothesis, base.terms)
     ]
-
-
-def _criterion(at: Fit, event: Term) -> float:
-    """Bayesian information criterion of an event at the parameters of a fit: three values for each window."""
-    begun = at.estimator.evaluate(at.hypothesis.with_term(event))
-    return float(begun.rows * np.log(begun.cost) + 3 * len(event.windows) * np.log(begun.rows))
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:

@@ -73,7 +73,8 @@ def torque_windows(fit: Fit, data: Dataset) -> list[Event]:
 def strength_told(without: Fit, term: Term, data: Dataset) -> bool:
     """True if the torque of recordings tells one of the long windows of an event, beside the twin of a fit without it.
 
-    Else it is a torque that wanders. True also where none is long, or there is no torque: then it is not asked.
+    Else it is a torque that wanders. A single window from the first row on is asked too: it may be the state in which
+    the recording begins. True also where none is asked, or there is no torque.
     """
     plain = fit_plain(without.data) if data.observability.torque_measured else None
     chances = [1.0]
@@ -81,10 +82,12 @@ def strength_told(without: Fit, term: Term, data: Dataset) -> bool:
         part = data.over(group)
         edges = [term.edges(one) for one in term.windows if one.run in {run.name for run in group}]
         for seen in _seen(without.hypothesis, part, plain) if plain and edges else ():
-            inside = [seen.inside(*one) for one in _whole(edges)]
+            inside = [seen.inside(*one) for one in _uncut(edges)]
             fit = seen.fit(inside)
-            long = [at for at, one in enumerate(inside) if one.sum() * _STEPS >= _SHORTEST * one.size]
-            chances += [_once(fit[f"force {at}"]) for at in long]
+            asked = [at for at, one in enumerate(inside) if one.sum() * _STEPS >= _SHORTEST * one.size]
+            if len(edges) == 1 and edges[0][0] - seen.time_s[0] < CUT_S:
+                asked = [0]
+            chances += [_once(fit[f"force {at}"]) for at in asked]
     return len(chances) == 1 or min(chances) < CRITERIA.significance
 
 
@@ -94,7 +97,7 @@ def _groups(data: Dataset) -> list[list[Measured]]:
     return [ordered] if ordered else [[run] for run in data.runs]
 
 
-def _whole(edges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def _uncut(edges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Windows (start, end) in order of time; those that a cut of the recording parts are one."""
     found = list[tuple[float, float]]()
     for start_s, end_s in sorted(edges):
@@ -106,7 +109,7 @@ def _whole(edges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Torque:
+class SlidingTorque:
     """A torque (n,) at times (n,) where the axis slides, and what else acts: columns (n, k)."""
 
     time_s: FloatArray
@@ -124,7 +127,7 @@ class _Torque:
         return least_squares({**columns, **forces}, self.torque, blocks=_BLOCKS)
 
 
-def _seen(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[_Torque]:
+def _seen(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[SlidingTorque]:
     """The torque of runs in order of time, needed beyond a twin and measured, as far as there are rows enough."""
     needed = needed_torque(hypothesis, data, plain)
     motions = [measured_motion(run) for run in data.runs]
@@ -134,7 +137,7 @@ def _seen(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[_Tor
     return [one for one in found if one.torque.size >= 2 * _STEPS and np.isfinite(one.torque).all()]
 
 
-def torque_over_time(runs: Sequence[Measured], series: Sequence[ResidualSeries], ratio: float | None) -> _Torque:
+def torque_over_time(runs: Sequence[Measured], series: Sequence[ResidualSeries], ratio: float | None) -> SlidingTorque:
     """The torque of runs beside the plain model, a torque over the position, and a slow wander.
 
     `ratio` [load rad per motor rad] is that of a load that turns.
@@ -150,10 +153,10 @@ def torque_over_time(runs: Sequence[Measured], series: Sequence[ResidualSeries],
         [np.concatenate([one[name][at] for one, at in zip(columns, rows, strict=True)]) for name in columns[0]]
     )
     phase = np.pi * (time_s - time_s[:1]) / max(float(np.ptp(time_s)) if time_s.size else 0.0, 1e-300)
-    return _Torque(time_s, torque, np.column_stack([table, np.cos(np.outer(phase, np.arange(1, _SLOW + 1)))]))
+    return SlidingTorque(time_s, torque, np.column_stack([table, np.cos(np.outer(phase, np.arange(1, _SLOW + 1)))]))
 
 
-def windows_of(seen: _Torque) -> list[ForceWindow]:
+def windows_of(seen: SlidingTorque) -> list[ForceWindow]:
     """Windows of a torque; each is told beside the others."""
     edges = np.linspace(0, seen.torque.size, _STEPS + 1).astype(int)
     found, taken = list[FloatArray](), np.zeros(_STEPS, dtype=bool)

@@ -3,7 +3,9 @@
 import numpy as np
 
 from hil.bench.bench_file import MechanismEntry
+from hil.bench.control_section import delay_in_words
 from hil.diagnosis.sentence import TermErrors, sentence
+from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -16,7 +18,8 @@ from hil.twin.library import BY_ID
 
 
 def in_bench(final: Fit, held_out: Dataset) -> str:
-    """Springs and mechanisms of the bench that are above their errors and matter; empty without."""
+    """Springs, a lateness of the torque of more than a row, and mechanisms of the bench that are above their errors and
+    matter; empty without."""
     hypothesis = final.hypothesis
     # a fit at the values of the bench file has no derivatives, and these values no errors
     errors = dict(zip(hypothesis.nominal, standard_errors(final) if final.jacobian.size else (), strict=False))
@@ -26,6 +29,10 @@ def in_bench(final: Fit, held_out: Dataset) -> str:
             continue
         if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
             told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
+    delay_s = hypothesis.resolved.bench.torque_delay_s
+    acts_s = (delay_s or 0.0) + 0.5 * final.bench.period_s  # the twin holds each value for a row
+    if delay_s and abs(acts_s) > max(SIGMAS * errors.get(DELAY, 0.0), final.bench.period_s):
+        told.append(f"The {delay_in_words(acts_s)}.")
     for kept in hypothesis.kept:
         entry, mechanism = kept.active(), BY_ID[kept.effect]
         known = [errors.get(f"{entry.effect}.{one.name}", 0.0) for one in mechanism.parameters]

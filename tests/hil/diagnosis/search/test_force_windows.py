@@ -147,3 +147,14 @@ def test_a_long_window_is_an_event_only_where_the_torque_tells_it_beside_a_slow_
         assert strength_told(without, term, without.data.over([first, last])) == told_so
     short = replace(term, values=(300.0, 1.0, 1.05))
     assert strength_told(without, short, without.data.over([first, last]))  # not asked
+
+
+@pytest.mark.parametrize(("share", "force_n", "told_so"), [(0.25, 300.0, True), (0.01, 0.0, False)])
+def test_the_state_in_which_a_recording_begins_is_no_event(share: float, force_n: float, told_so: bool) -> None:
+    """A single short window from the first row that slides on is asked too."""
+    first, last = pushed(force_n, 0.0, share * DURATION_S)
+    without = evaluated(Hypothesis(OWNER), dataset([first], OWNER))
+    every = without.data.over([first, last])
+    begin_s = float(RUN.time_s[SLIDING][0])
+    term = Term("external_force", 0, (300.0, begin_s, begin_s + share * DURATION_S), windows=(Window(first.name),))
+    assert strength_told(without, term, every) == told_so

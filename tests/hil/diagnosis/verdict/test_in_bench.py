@@ -30,3 +30,15 @@ def test_a_load_is_told_if_it_is_more_than_the_torque_left(load_n_m: float, told
     said = in_bench(fit, dataset([run], owner))
     assert ("A constant load of 0.500 N m: a weight, a preload, or an offset" in said) is told
     assert "such as a weight" not in said
+
+
+@pytest.mark.parametrize(("late_s", "told"), [(-0.0048, "torque is recorded 4.30 ms after it acts"), (-0.0005, "")])
+def test_a_lateness_of_the_torque_is_told_from_a_row_on(late_s: float, told: str) -> None:
+    """Without the half row for which the twin holds each value."""
+    control = {"law": "unknown", "velocity_period_s": 0.001, "torque_delay_s": late_s}
+    owner = Bench.model_validate({**bench().model_dump(exclude={"control"}), "control": control})
+    run = take(recorded(bench()), owner)
+    data = dataset([run], owner)
+    said = in_bench(evaluated(Hypothesis(owner), data), data)
+    assert told in said
+    assert bool(said) is bool(told)

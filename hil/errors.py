@@ -69,7 +69,7 @@ class PartOfAxis(InputError):
     """A file lacks the position or the torque of the axis, which another file of the same run may have."""
 
     def __init__(self, problem: str) -> None:
-        super().__init__(f"{problem}; or, if another file of the same run has it, join the two by time into one file")
+        super().__init__(f"{problem}; or, if another file of the same run has it, give both: hil explain FILE FILE")
         self.problem = problem
 
 

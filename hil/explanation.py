@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING
 
 from hil.drafting.draft_mark import draft_state, marked
 from hil.drafting.first_look import first_look
-from hil.errors import InputError, PartOfAxis, RateNeeded, listed
+from hil.errors import InputError, PartOfAxis, RateNeeded
 from hil.exchange.own_file import read_exported
 from hil.files.input_file import is_file
 from hil.files.output import rewritten_folder, write_text
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
+from hil.importing.joined_logs import join_logs
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import COUNT_AS, take_own_units
 from hil.recording.recording import Recording, read_recording
@@ -112,11 +113,12 @@ def explain(
 ) -> Explanation:
     """Read the recordings of one axis, draft what the folder lacks, diagnose, and write the page.
 
-    sources: a file or several, any that `hil import` reads. folder: None takes explained-NAME of the first file; maps
-    and bench that are there are used, so correct them and call again. rate_hz: rows per second of files without time
-    stamps. axis: that of files with several. progress: called with each step. look: called with what the recordings
-    show without a twin, as soon as they are read. first: called with what is known before the search. answer: called
-    with the diagnosis before its page is drawn. budget_s: processor time of the search [s].
+    sources: a file or several, any that `hil import` reads; where one has the position and another the torque, they are
+    joined by their stamps. folder: None takes explained-NAME of the first file; maps and bench that are there are used,
+    so correct them and call again. rate_hz: rows per second of files without time stamps. axis: that of files with
+    several. progress: called with each step. look: called with what the recordings show without a twin, as soon as they
+    are read. first: called with what is known before the search. answer: called with the diagnosis before its page is
+    drawn. budget_s: processor time of the search [s].
 
     Returns `diagnosis`, `bench`, `recordings`, `assumed`, `folder` and `report`. Raises InputError for a file that
     cannot be read, with the lines of its map that the user must complete, and for recordings that cannot be diagnosed.
@@ -125,22 +127,15 @@ def explain(
     if not paths:
         raise InputError("sources: given none, allowed one or more; give the recordings to explain")
     folder = Path(f"explained-{paths[0].stem}") if folder is None else Path(folder)
-    read = list[Recording]()
-    assumed = list[str]()
-    for source in paths:
-        progress(f"reading {source.name}")
-        try:
-            recording, notes = _recording(source, _map_path(source, paths, folder), rate_hz, axis)
-        except PartOfAxis as error:
-            if len(paths) == 1:
-                raise
-            raise InputError(
-                f"{error.problem}; {listed(one.name for one in paths)} look like loggers of one run: join them by time "
-                "into one file with a column for each channel; several files are several recordings of one axis, each "
-                "with its position and torque"
-            ) from None
-        read.append(recording)
-        assumed += notes
+    try:
+        read, assumed = _recordings(paths, folder, rate_hz, axis, progress)
+    except PartOfAxis:
+        if len(paths) == 1:
+            raise
+        joined = folder / f"{paths[0].stem}-joined.csv"
+        told = join_logs(paths, joined)
+        read, assumed = _recordings([joined], folder, rate_hz, axis, progress)
+        assumed = [told, *assumed]
     look(first_look(read))
     progress("taking the bench, or drafting it")
     bench, draft, notes = _bench(read, folder / BENCH)
@@ -157,6 +152,19 @@ def explain(
         path = folder / BENCH
         write_diagnosis(diagnosis, part, basis.assumed, path if is_file(path) else None)
     return Explanation(basis, diagnosis, folder)
+
+
+def _recordings(
+    paths: Sequence[Path], folder: Path, rate_hz: float | None, axis: str | None, progress: Callable[[str], None]
+) -> tuple[list[Recording], list[str]]:
+    """The recordings of files, and what was assumed."""
+    read, assumed = list[Recording](), list[str]()
+    for source in paths:
+        progress(f"reading {source.name}")
+        recording, notes = _recording(source, _map_path(source, paths, folder), rate_hz, axis)
+        read.append(recording)
+        assumed += notes
+    return read, assumed
 
 
 def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:

@@ -10,9 +10,12 @@
 {"x": [[0, 0.1], ...], "y": [[0, 1], ...]}           values with stamps of each channel (`json_points`)
 [["t", "x"], [0, 0.1], [1, 0.2]]                     a matrix, with a row of names or without
 {"t": 0, "x": 0.1}                                   one such record in each line
+
+A record in the stream that is no row, as a greeting or a heartbeat, is a source of scalars.
 """
 
 import json
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +27,7 @@ from hil.errors import InputError, listed
 from hil.files.input_file import MOST_BYTES, check_file, check_values, parsing
 from hil.files.json_points import NAME_KEYS, VALUE_KEYS, first_of, rows_of_points, stamp_of
 
+_SELDOM = 0.05  # share of the records: a value that fewer have is no channel
 MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 72 bytes
 
 
@@ -106,6 +110,20 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
+def _rows(records: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The records that are rows, and the others: with a value that few have, without one that all usual kinds have."""
+    few = _SELDOM * len(records)
+    times = Counter(key for one in records for key in one)
+    kinds = Counter(frozenset(one) for one in records)
+    usual = [kind for kind, number in kinds.items() if number > few]
+    shared = frozenset.intersection(*usual) if usual else frozenset[str]()
+    rows, others = list[dict[str, Any]](), list[dict[str, Any]]()
+    for one in records:
+        is_row = shared <= one.keys() or all(times[key] > few for key in one)
+        (rows if is_row else others).append(one)
+    return rows, others
+
+
 def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> None:
     """Put what `data` holds into `into`; `within` is the path to it, with a point at its end."""
     lists, units = into.lists, into.units
@@ -117,7 +135,9 @@ def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> No
             lists.update({name: values for name, values, _ in channels})
             units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})
         else:  # a record per row
-            flat = [_flat(row) for row in data]
+            flat, others = _rows([_flat(row) for row in data])
+            for other in others:
+                _collect(path, other, into)
             keys = dict.fromkeys(key for row in flat for key in row)
             check_values(path, len(keys) * len(flat), f"{len(flat)} records with {len(keys)} keys")
             for key in keys:

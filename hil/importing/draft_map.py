@@ -43,7 +43,7 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
     """
     path = Path(path)
     table = read_table(path)
-    given, labels = table.columns, _labels(table)
+    given, labels = table.columns, labels_of(table)
     times = set(time_columns(table, labels))
     own = on_one_clock(table, labels)
     table = own.table
@@ -52,9 +52,9 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
     distinct = without_duplicates(table.columns | filled_up)
     lines = table.lines[distinct.rows] if table.lines is not None else None
     table = replace(table, columns=distinct.columns, lines=lines)
-    labels = _labels(table)
+    labels = labels_of(table)
     clock = find_clock(table, labels, rate_hz)
-    columns = {name: _scaled(table, name) for name in table.columns if name not in clock.columns}
+    columns = {name: scaled(table, name) for name in table.columns if name not in clock.columns}
     may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]
     wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
@@ -159,7 +159,7 @@ def _list_the_rest(draft: MapDraft, given: Mapping[str, FloatArray], times: Coll
             draft.left_out[name] = why if np.isfinite(values).any() else "has no finite number"
 
 
-def _labels(table: ForeignTable) -> dict[str, Label]:
+def labels_of(table: ForeignTable) -> dict[str, Label]:
     """Meaning of the columns by all that the file says of them."""
     units = table.units | table.cell_units
     told = {name: (units.get(name, ""), table.words.get(name, ""), name in table.cell_units) for name in table.columns}
@@ -169,7 +169,7 @@ def _labels(table: ForeignTable) -> dict[str, Label]:
     return labels | {name: replace(labels[name], unit=None) for name in metres if name not in units}
 
 
-def _scaled(table: ForeignTable, name: str) -> FloatArray:
+def scaled(table: ForeignTable, name: str) -> FloatArray:
     """A column (n,) with the factor and offset that the file gives for it."""
     factor, offset = table.scales.get(name, (1.0, 0.0))
     return factor * table.columns[name] + offset

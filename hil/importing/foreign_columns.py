@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
-from hil.files.date_stamps import seconds_of
+from hil.files.date_stamps import DAY_S, seconds_of
 from hil.files.input_file import check_file, first_bytes, is_text
 from hil.importing.long_text import long_form
 from hil.importing.map_file import CsvOptions
@@ -175,7 +175,8 @@ def parquet_dates(path: Path, name: str) -> FloatArray:
     if not pa.types.is_timestamp(column.type):
         return seconds_of([str(number) for number in column.to_pylist()])
     nanoseconds = column.cast(pa.timestamp("ns", column.type.tz), safe=False).cast(pa.int64()).to_numpy()
-    return np.asarray((nanoseconds - nanoseconds[0]) * 1e-9, dtype=np.float64)
+    day = round(DAY_S * 1e9)
+    return np.asarray((nanoseconds - nanoseconds[0] // day * day) * 1e-9, dtype=np.float64)
 
 
 def _check(

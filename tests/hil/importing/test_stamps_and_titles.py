@@ -66,3 +66,22 @@ def test_wide_blanks_do_not_part_names_between_tabs(tmp_path: Path) -> None:
     path.write_text("\n".join(["t [s]\tmotor  angle [rad]\ttorque  [Nm]\tvalid", *rows]) + "\n")
     columns = {str(one.entry["column"]) for one in draft_map(path).channels}
     assert columns == {"motor  angle [rad]", "torque  [Nm]"}
+
+
+def test_greetings_and_heartbeats_in_a_stream_of_records_are_no_rows(tmp_path: Path) -> None:
+    """What they tell, as the rate, is told; a row that lacks a channel is a row."""
+    stamps_ms = np.round(1.7e12 + 4.0 * np.arange(AXIS["t"].size))
+    rows = [
+        {"type": "d", "ts": stamps_ms[row], "q_rad": AXIS["angle"][row], "i_a": AXIS["torque"][row]}
+        for row in range(AXIS["t"].size)
+    ]
+    del rows[700]["i_a"]
+    beats = [{"type": "hb", "ts": stamps_ms[row] + 1.0, "up": row} for row in (1000, 2000)]
+    stream = [{"type": "hello", "rate_hz": 250}, *rows[:1500], *beats, *rows[1500:]]
+    path = tmp_path / "gateway.jsonl"
+    path.write_text("\n".join(map(json.dumps, stream)) + "\n")
+    draft = draft_map(path)
+    assert draft.table.columns["ts"].size == len(rows)
+    assert draft.table.scalars["rate_hz"] == 250.0
+    assert draft.clock.time is not None
+    assert (draft.clock.time.column, draft.clock.time.unit) == ("ts", "ms")

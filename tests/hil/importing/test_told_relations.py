@@ -1,4 +1,4 @@
-"""Two encoders are no set-point and its motion; ratios that columns tell; steppers; loggers of one run."""
+"""Two encoders are no set-point and its motion; ratios that columns tell; steppers."""
 
 from __future__ import annotations
 
@@ -163,12 +163,3 @@ def test_a_set_point_in_the_counts_of_the_encoder_is_none_of_a_stepper(tmp_path:
     counts = np.roll(STEPS, 3)
     with pytest.raises(PartOfAxis, match=r"no torque.*another file of the same run"):
         drafted(tmp_path / "log.csv", {"CMD": STEPS, "ENC": counts})
-
-
-def test_two_loggers_of_one_run_are_named(tmp_path: Path) -> None:
-    one, other = tmp_path / "gather.csv", tmp_path / "scope.csv"
-    one.write_text(csv_text({"t_s": T, "x_mm": AXIS["x_act"]}))
-    other.write_text(csv_text({"t_s": T, "torque_Nm": TORQUE}))
-    for paths in ([one, other], [other, one]):
-        with pytest.raises(InputError, match=r"look like loggers of one run: join them by time into one file"):
-            explain(paths, tmp_path / "out")

@@ -1,0 +1,74 @@
+"""Loggers of one run: joined by their stamps at the rows of the slowest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from foreign_axis import axis, csv_text
+
+from hil.errors import InputError
+from hil.explanation import explain
+from hil.importing.foreign_table import read_table
+from hil.importing.joined_logs import STAMP, join_logs
+
+AXIS = axis(6000)
+T, EVERY = AXIS["t"], 4  # the controller writes every fourth row
+BEGIN = pd.Timestamp("2025-03-11T14:07:31.200")
+
+
+def controller(path: Path, begin: pd.Timestamp = BEGIN) -> Path:
+    """Positions with dates of the local clock, from the first row on."""
+    stamps = [(begin + pd.Timedelta(seconds=float(one))).isoformat(timespec="microseconds") for one in T[::EVERY]]
+    rows = zip(stamps, AXIS["x_set"][::EVERY], AXIS["x_act"][::EVERY], strict=True)
+    path.write_text("stamp;cmd [mm];act [mm]\n" + "".join(f"{a};{b:.4f};{c:.4f}\n" for a, b, c in rows))
+    return path
+
+
+def drive(path: Path, hours: float = 0.0) -> Path:
+    """Speed and torque by a clock that is ahead by hours, from 0.5 s after the controller on."""
+    late = T >= 0.5
+    stamps = BEGIN + pd.to_timedelta(T[late], "s") + pd.Timedelta(hours=hours)
+    columns = {"rpm": AXIS["speed"][late] * 30 / np.pi, "torque_Nm": AXIS["torque"][late]}
+    pd.DataFrame({"timestamp": stamps, **columns}).to_parquet(path)
+    return path
+
+
+@pytest.mark.parametrize("hours", [0.0, -1.0])
+def test_rows_are_those_of_the_slowest_in_the_time_that_all_have(tmp_path: Path, hours: float) -> None:
+    joined = tmp_path / "joined.csv"
+    told = join_logs([controller(tmp_path / "a.csv"), drive(tmp_path / "b.parquet", hours)], joined)
+    assert ("b.parquet by -1 h" in told) is (hours == -1.0)
+    table = read_table(joined).columns
+    there = (T >= 0.5) & (np.arange(T.size) % EVERY == 0)
+    assert table[STAMP] == pytest.approx(T[there] - T[there][0], abs=2e-6)
+    assert table["act [mm]"] == pytest.approx(AXIS["x_act"][there], abs=1e-4)
+    assert table["torque_Nm"] == pytest.approx(AXIS["torque"][there], abs=1e-3)
+
+
+@pytest.mark.parametrize("first", ["controller", "drive"])
+def test_explain_joins_what_is_no_axis_alone(tmp_path: Path, first: str) -> None:
+    paths = [controller(tmp_path / "controller.csv"), drive(tmp_path / "drive.parquet")]
+    seen = list[str]()
+
+    def look(lines: list[str]) -> None:
+        seen.extend(lines)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        explain(paths if first == "controller" else paths[::-1], tmp_path / "out", look=look)
+    assert "inertia at the motor 0.00200 kg m^2" in " ".join(seen)
+    assert (tmp_path / "out" / f"{first}-joined.csv").is_file()
+
+
+def test_loggers_of_two_runs_and_files_without_stamps_are_refused(tmp_path: Path) -> None:
+    other = controller(tmp_path / "other.csv", BEGIN + pd.Timedelta(minutes=10))
+    with pytest.raises(InputError, match=r"other\.csv, drive\.parquet: their stamps have 0\.00 s in common"):
+        join_logs([other, drive(tmp_path / "drive.parquet")], tmp_path / "joined.csv")
+    bare = tmp_path / "bare.csv"
+    bare.write_text("# rate: 1000 Hz\n" + csv_text({"torque_Nm": AXIS["torque"], "speed_rpm": AXIS["speed"]}))
+    with pytest.raises(InputError, match=r"bare\.csv: has no stamps"):
+        join_logs([other, bare], tmp_path / "joined.csv")
+    assert not (tmp_path / "joined.csv").exists()

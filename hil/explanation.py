@@ -157,14 +157,25 @@ def explain(
 def _recordings(
     paths: Sequence[Path], folder: Path, rate_hz: float | None, axis: str | None, progress: Callable[[str], None]
 ) -> tuple[list[Recording], list[str]]:
-    """The recordings of files, and what was assumed."""
+    """The recordings of files, and what was assumed. A file without a map of its own has that of the first if it can."""
     read, assumed = list[Recording](), list[str]()
+    first = _map_path(paths[0], paths, folder)
     for source in paths:
         progress(f"reading {source.name}")
-        recording, notes = _recording(source, _map_path(source, paths, folder), rate_hz, axis)
+        path = _map_path(source, paths, folder)
+        shared = None if is_file(path) or not is_file(first) else _by_map(source, first)
+        recording, notes = shared or _recording(source, path, rate_hz, axis)
         read.append(recording)
         assumed += notes
     return read, assumed
+
+
+def _by_map(source: Path, path: Path) -> tuple[Recording, list[str]] | None:
+    """A further file by the map of the first; None for one of other columns."""
+    try:
+        return import_recording(source, path), [f"{path}: used for {source.name} too"]
+    except InputError:
+        return None
 
 
 def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:

@@ -169,6 +169,8 @@ def unit_of_stamps(
         note = f"clock: the unit of {told.column!r} is not given; {rate[1]}, so that a step of {step:g} is one period"
         return replace(stamps, time=scaled, seconds=raw * scaled.scale, sure=True), note
     unit, note = unit_by_step(told, step)
+    if not note and told.unit is None and bool(np.all(raw == np.round(raw))):  # a counter may count any clock
+        note = f"clock: the unit of {told.column!r} is not given; {unit} is taken (steps of {step:g} {unit})"
     return in_unit(unit), note
 
 

@@ -68,9 +68,14 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
 
     "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"; "COL 3  POS.ACT  mm".
     """
-    last = re.search(rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+[\[({{]?([^\s;,|\])}}]+)[\])}}]?\s*$", line)
-    if last and unit_named(last[1]) and last[1] not in names:  # else it is a header, of t, n and m
-        return "", last[1]
+    last = re.search(
+        rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+(?:[\[({{]([^\])}}]+)[\])}}]|([^\s;,|\])}}]+)[\])}}]?)\s*$", line
+    )
+    told = (last[1] or last[2]) if last else ""
+    if unit_named(told) and told not in names:  # else it is a header, of t, n and m
+        return "", told
+    if last and last[1] and factor_and_unit(told):  # 0 cnt [1/4 us]
+        return "", told
     rest = rest_of_channel(line, name)
     if rest is None:
         return None

@@ -85,3 +85,16 @@ def test_greetings_and_heartbeats_in_a_stream_of_records_are_no_rows(tmp_path: P
     assert draft.table.scalars["rate_hz"] == 250.0
     assert draft.clock.time is not None
     assert (draft.clock.time.column, draft.clock.time.unit) == ("ts", "ms")
+
+
+def test_a_counter_of_a_quarter_of_a_microsecond_is_told_by_its_line_and_else_doubtful(tmp_path: Path) -> None:
+    ticks = 882031560 + 4000 * np.arange(AXIS["t"].size)
+    rows = [f"{a}\t{b:.4f}\t{c:.5f}" for a, b, c in zip(ticks, AXIS["x_act"], AXIS["torque"], strict=True)]
+    lines = ["%   0 cnt  [1/4 us]", "%   1 pos [mm]", "%   2 torque [Nm]"]
+    path = tmp_path / "scope.tsv"
+    path.write_text("\n".join([*lines, "cnt\tpos\ttorque", *rows]) + "\n")
+    time = draft_map(path).clock.time
+    assert time is not None
+    assert (time.unit, time.scale) == ("us", 0.25)
+    path.write_text("\n".join([*lines[1:], "cnt\tpos\ttorque", *rows]) + "\n")
+    assert "clock: the unit of 'cnt' is not given; us is taken (steps of 4000 us)" in draft_map(path).unsure

@@ -157,7 +157,7 @@ def explain(
 def _recordings(
     paths: Sequence[Path], folder: Path, rate_hz: float | None, axis: str | None, progress: Callable[[str], None]
 ) -> tuple[list[Recording], list[str]]:
-    """The recordings of files, and what was assumed. A file without a map of its own has that of the first if it can."""
+    """The recordings of files, and what was assumed. A file without a map has that of the first if it can."""
     read, assumed = list[Recording](), list[str]()
     first = _map_path(paths[0], paths, folder)
     for source in paths:

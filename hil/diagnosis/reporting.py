@@ -22,7 +22,7 @@ from hil.diagnosis.result import (
     Unnamed,
     Verdict,
 )
-from hil.diagnosis.stages import Judged, Progress, Reported
+from hil.diagnosis.stages import Judged, Prepared, Progress, Reported
 from hil.diagnosis.statement import statement
 from hil.diagnosis.structure_left import Dependence, like_noise
 from hil.diagnosis.verdict.corrections import corrections, diagnosed_bench
@@ -36,6 +36,7 @@ from hil.diagnosis.verdict.testability import not_testable
 from hil.diagnosis.verdict.unnamed import UnnamedTerm, with_maps
 from hil.diagnosis.wording import channel_names, spoken, title, where_in_short
 from hil.identification.estimator import Fit
+from hil.identification.following import following
 from hil.identification.noise_floor import FLOOR
 from hil.quantities import digits
 from hil.twin.library import BY_ID
@@ -87,8 +88,18 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
     of_plant = statement(result.model_copy(update={"verdict": judged.of_plant}))
     # settings of the controller come after what is found on the machine
     sentences = [of_plant, law.advice] if found or judged.change else [law.advice, of_plant]
-    result = result.model_copy(update={"statement": " ".join(filter(None, [*sentences, in_bench(final, held_out)]))})
+    sentences += [in_bench(final, held_out), _following(prepared)]
+    result = result.model_copy(update={"statement": " ".join(filter(None, sentences))})
     return Reported(judged, result, _bench(judged), experiment)
+
+
+def _following(prepared: Prepared) -> str:
+    """How the motion follows its set-points where no control law says why; empty without set-points or lateness."""
+    if prepared.bench.law_known:
+        return ""
+    run, axis = prepared.train.runs[0], prepared.bench.axis
+    found = following(run.position_command_m, run.motor, run.period_s)
+    return found.in_words("rad" if axis.turns else "m") if found else ""
 
 
 def _location(judged: Judged) -> Location | None:

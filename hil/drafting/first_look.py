@@ -1,4 +1,4 @@
-"""What recordings show at once, before any twin: how they move, the plain model, the second encoder."""
+"""What recordings show at once, before any twin: motion, plain model, second encoder, lateness behind set-points."""
 
 from collections.abc import Sequence
 
@@ -8,13 +8,15 @@ from hil.channels import AxisKind
 from hil.drafting.assumed_plant import ASSUMED
 from hil.drafting.plant_told import PlantTold, moving_parts, plant_told
 from hil.errors import InputError
+from hil.identification.following import following
 from hil.identification.least_squares import Estimate
 from hil.quantities import digits, percent, quantity
 from hil.recording.recording import Recording
 
 
 def first_look(recordings: Sequence[Recording]) -> list[str]:
-    """Lines on recordings of one axis: duration and speed, plain model with standard errors, second encoder.
+    """Lines on recordings of one axis: duration and speed, plain model with standard errors, second encoder,
+    lateness behind the set-points.
 
     What cannot be told is said with its reason; nothing is raised.
     """
@@ -24,7 +26,7 @@ def first_look(recordings: Sequence[Recording]) -> list[str]:
         told = plant_told(parts)
     except InputError as error:
         return [f"No plain model: {error}"]
-    return [*lines, *_plain(told, parts[0]), *_second_encoder(told)]
+    return [*lines, *_plain(told, parts[0]), *_second_encoder(told), *_following(told, parts[0])]
 
 
 def _moves(parts: Sequence[Recording]) -> str:
@@ -77,6 +79,17 @@ def _second_encoder(told: PlantTold) -> list[str]:
     if seen.friction_m.significant:
         line += f", {quantity(2.0 * abs(seen.friction_m.value), unit)} between directions"
     return [f"{line}."]
+
+
+def _following(told: PlantTold, recording: Recording) -> list[str]:
+    """How the motion follows its set-points, by the encoder that leaves less; nothing where none are recorded."""
+    names, columns = recording.axis, recording.columns
+    if names.position_command not in columns:
+        return []
+    measured = [columns[name] for name in (names.motor_position, names.table_position) if name in columns]
+    found = [following(columns[names.position_command], one, recording.period_s) for one in measured]
+    best = min((one for one in found if one), key=lambda one: one.left, default=None)
+    return [best.in_words("rad" if told.turns else "m")] if best else []
 
 
 def _shown(one: Estimate, unit: str) -> str:

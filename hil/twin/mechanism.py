@@ -95,8 +95,9 @@ class Text:
     picture: Picture = Picture.TIME  # of all variants
     reversed: str = ""  # of a negative strength, which it gives without the sign; without: `sentence`
     rate: str = ""  # where the time in which a change ends is not told: names its strength per minute, {rate}
-    # (number of windows, True at equal intervals) -> sentence of an event; may also name count, and width and period
-    of_windows: Callable[[int, bool], str] | None = None
+    # (number of windows, True at equal intervals, True if each is against the motion) -> sentence of an event; may also
+    # name count, and width and period
+    of_windows: Callable[[int, bool, bool], str] | None = None
 
 
 @dataclass(frozen=True)

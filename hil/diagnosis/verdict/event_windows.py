@@ -83,7 +83,11 @@ def describe_event(final: Fit, index: int, held_out: Dataset) -> EventReport:
     found = dict(zip(names, (value_of(first, 0), value_of(last, 1), value_of(strongest, 2)), strict=True))
     parameters = {name: found[name] for name in mechanism.names}
     of_windows = mechanism.text.of_windows
-    text = of_windows(_different(seen), train is not None) if of_windows else mechanism.text.sentence
+    text = (
+        of_windows(_different(seen), train is not None, _against_motion(seen))
+        if of_windows
+        else mechanism.text.sentence
+    )
     words = {one.name: value_in_words(parameters[one.name].value, one, bench) for one in mechanism.parameters}
     words["count"] = str(train.count if train else _different(seen))
     if train is not None:
@@ -180,6 +184,20 @@ def _different(seen: Sequence[Seen]) -> int:
     """Number of windows at different times: the same one in several recordings counts once."""
     starts = np.sort([one.values[0] for one in seen])
     return 1 + int(np.count_nonzero(np.diff(starts) > _REGULAR_S))
+
+
+def _against_motion(seen: Sequence[Seen]) -> bool:
+    """True if windows of one strength are each against the way that the motor goes in them, both ways, by no chance."""
+    moved = list[float]()
+    for run, (start_s, end_s, _) in ((one.run, one.values) for one in seen):
+        inside = run.motor[(run.time_s >= start_s) & (run.time_s <= end_s)]
+        moved.append(float(inside[-1] - inside[0]) if inside.size > 1 else 0.0)
+    strength, error = np.array([(one.values[2], one.errors[2]) for one in seen]).T
+    known = np.array(moved) != 0.0
+    against = np.sign(moved)[known] * strength[known]
+    both_ways = np.ptp(np.sign(strength[known]), axis=0) > 1.0 if known.any() else False
+    alike = _common(np.abs(strength[known]), error[known]) is not None if both_ways else False
+    return bool(alike and np.all(against < 0.0)) and 0.5**against.size < CRITERIA.significance
 
 
 def train_of(edges: FloatArray, errors: FloatArray) -> tuple[PulseTrain, FloatArray, FloatArray] | None:

@@ -18,6 +18,10 @@ _PERIODIC = (
     "From {start_s} to {end_s} a force of {force_n} (positive forwards) acts on the table {count} times, for "
     "{width_s} every {period_s}."
 )
+_AGAINST = (
+    "From {start_s} to {end_s} forces of up to {force_n} act on the table in {count} windows, each against its motion: "
+    "friction that comes and goes, such as a brake that drags."
+)
 
 
 @njit
@@ -37,8 +41,8 @@ def _pushes(time_s: FloatArray, period_s: float, values: Sequence[float]) -> Flo
     return np.asarray(force_n / period_s * np.maximum(overlap_s, 0.0), dtype=np.float64)
 
 
-def _sentence(windows: int, periodic: bool) -> str:
-    return _PERIODIC if periodic else _SEVERAL if windows > 1 else _ONE
+def _sentence(windows: int, periodic: bool, against: bool) -> str:
+    return _AGAINST if against else _PERIODIC if periodic else _SEVERAL if windows > 1 else _ONE
 
 
 MECHANISM = Mechanism(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnosis_runs import bench, recorded
 
-from hil.diagnosis.verdict.event_windows import Seen, joined, train_of
+from hil.diagnosis.verdict.event_windows import Seen, _against_motion, joined, train_of
 from hil.identification.measured import take
 
 OWNER = bench()
@@ -39,3 +40,20 @@ def test_an_edge_that_nothing_tells_contradicts_no_period() -> None:
     assert told[2, 1] < 1e-3
     errors[2, 1] = 1e-3
     assert train_of(edges, errors) is None
+
+
+@pytest.mark.parametrize(
+    ("strength_n", "ways", "against"),
+    [(lambda way: -20.0 * way, 8, True), (lambda way: -20.0 * way, 4, False), (lambda _: -20.0, 8, False)],
+    ids=["a drag", "few windows", "a push"],
+)
+def test_windows_against_the_motion_both_ways_are_a_drag(
+    strength_n: Callable[[float], float], ways: int, against: bool
+) -> None:
+    """Windows of 20 ms between the reversals of a motion to and fro."""
+    run = take(recorded(OWNER), OWNER)
+    to_and_fro = replace(run, motor=np.sin(2.0 * np.pi * run.time_s / 0.4))
+    middles = [(0.2 * number, -1.0 if number % 2 else 1.0) for number in range(1, ways + 1)]  # time, way
+    seen = [Seen(to_and_fro, (at - 0.01, at + 0.01, strength_n(way)), (1e-3, 1e-3, 1.0)) for at, way in middles]
+    assert _against_motion(seen) == against
+    assert not _against_motion([replace(one, values=(*one.values[:2], -one.values[2])) for one in seen])

@@ -1,7 +1,7 @@
 """Verdict on plant and control law, from the fits at the bench file's values, refitted, and with terms."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,14 +11,17 @@ from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
-from hil.diagnosis.verdict.corrections import corrections
+from hil.diagnosis.verdict.corrections import corrections, diagnosed_bench
 from hil.diagnosis.verdict.each_alone import Change, changed
 from hil.diagnosis.verdict.reproduction import reproduction
 from hil.diagnosis.verdict.unnamed import unnamed_terms
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import bic_gain
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import is_load
 from hil.identification.torque_left import fit_plain, mismatch_left, needed_torque
 
 
@@ -48,7 +51,7 @@ def judge(tested: Tested) -> Judged:
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
     moves = any(one.question.change for one in beside)
     if open_ones or (moves and not searched.stopped_at):
-        change = _better(changed(refit.fit, held_out, moves), searched.nominal, final, held_out)
+        change = _better(changed(_with_loads(refit.fit, final), held_out, moves), searched.nominal, final, held_out)
     if change and named and not _needs_less_torque(change, final):
         change = None
     if change and change.explains_all:
@@ -65,6 +68,15 @@ def judge(tested: Tested) -> Judged:
     left = tuple(sorted(of_each, key=lambda one: -one.explained)) if of_parts else structure_left(final, held_out)
     maps = () if change else unnamed_terms(final, left, held_out)
     return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left, maps)
+
+
+def _with_loads(refit: Fit, final: Fit) -> Fit:
+    """The refit beside the loads that are found, a weight, a spring or gravity, so that parts tell theirs."""
+    loads = [term for term in final.terms if is_load(term) and not term.windows]
+    if not loads:
+        return refit
+    loaded = replace(refit, hypothesis=Hypothesis(refit.bench, tuple(loads)))
+    return fit_nominal_parameters(replace(refit.data, bench=diagnosed_bench(refit.bench, loaded)))
 
 
 def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:

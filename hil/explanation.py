@@ -16,6 +16,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import yaml
+
 from hil.drafting.draft_mark import draft_state, marked
 from hil.drafting.first_look import first_look
 from hil.errors import InputError, PartOfAxis, RateNeeded
@@ -133,8 +135,8 @@ def explain(
         if len(paths) == 1:
             raise
         joined = folder / f"{paths[0].stem}-joined.csv"
-        told = join_logs(paths, joined)
-        read, assumed = _recordings([joined], folder, rate_hz, axis, progress)
+        told = join_logs(paths, joined, any(_is_whole(one, rate_hz, axis) for one in paths))
+        read, assumed = _recordings([joined], folder, None, axis, progress)
         assumed = [told, *assumed]
     look(first_look(read))
     progress("taking the bench, or drafting it")
@@ -157,25 +159,33 @@ def explain(
 def _recordings(
     paths: Sequence[Path], folder: Path, rate_hz: float | None, axis: str | None, progress: Callable[[str], None]
 ) -> tuple[list[Recording], list[str]]:
-    """The recordings of files, and what was assumed. A file without a map has that of the first if it can."""
+    """The recordings of files, and what was assumed. One map is for all files whose drafts say the same."""
     read, assumed = list[Recording](), list[str]()
     first = _map_path(paths[0], paths, folder)
     for source in paths:
         progress(f"reading {source.name}")
         path = _map_path(source, paths, folder)
-        shared = None if is_file(path) or not is_file(first) else _by_map(source, first)
-        recording, notes = shared or _recording(source, path, rate_hz, axis)
+        shared = not is_file(path) and is_file(first) and _alike(source, paths[0], rate_hz, axis)
+        recording, notes = _recording(source, first if shared else path, rate_hz, axis)
         read.append(recording)
         assumed += notes
     return read, assumed
 
 
-def _by_map(source: Path, path: Path) -> tuple[Recording, list[str]] | None:
-    """A further file by the map of the first; None for one of other columns."""
+def _alike(source: Path, first: Path, rate_hz: float | None, axis: str | None) -> bool:
+    """True if the drafts of the maps of two files say the same, so that one map is right for both."""
+    with suppress(InputError):
+        drafts = [yaml.safe_load(map_text(draft_map(one, rate_hz, axis))) for one in (source, first)]
+        return bool(drafts[0] | {"about": ""} == drafts[1] | {"about": ""})
+    return False
+
+
+def _is_whole(source: Path, rate_hz: float | None, axis: str | None) -> bool:
+    """True if a file has what a recording needs, by itself."""
     try:
-        return import_recording(source, path), [f"{path}: used for {source.name} too"]
-    except InputError:
-        return None
+        return all(one.key != "column" for one in draft_map(source, rate_hz, axis).asked)
+    except PartOfAxis:
+        return False
 
 
 def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:

@@ -33,12 +33,16 @@ MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 7
 
 @dataclass(frozen=True)
 class RecordColumns:
-    """Lists of values, scalars, units and texts of a file of records, by name; scalars and texts by path: motor.kt."""
+    """Lists of values, scalars, units and texts of a file of records, by name; scalars and texts by path: motor.kt.
+
+    `notes` tell what was left out.
+    """
 
     lists: dict[str, list[Any]]
     scalars: dict[str, float]
     units: dict[str, str]
     texts: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
     def numbers(self, path: Path, name: str) -> FloatArray:
         """The list `name` as numbers (n,), null as NaN. Raises InputError: no such list, or no numbers."""
@@ -110,18 +114,24 @@ def _flat(row: dict[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _rows(records: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The records that are rows, and the others: with a value that few have, without one that all usual kinds have."""
+def _rows(records: list[dict[str, Any]]) -> tuple[list[bool], list[int]]:
+    """Which records are rows, and which are the only ones of their kind, as a greeting.
+
+    No row is one with a value that few records have, and half or less of the values that all usual kinds have, but for
+    texts.
+    """
     few = _SELDOM * len(records)
     times = Counter(key for one in records for key in one)
     kinds = Counter(frozenset(one) for one in records)
     usual = [kind for kind, number in kinds.items() if number > few]
-    shared = frozenset.intersection(*usual) if usual else frozenset[str]()
-    rows, others = list[dict[str, Any]](), list[dict[str, Any]]()
-    for one in records:
-        is_row = shared <= one.keys() or all(times[key] > few for key in one)
-        (rows if is_row else others).append(one)
-    return rows, others
+    texts = {key for one in records[-1:] for key, value in one.items() if isinstance(value, str)}
+    shared = frozenset.intersection(*usual) - texts if usual else frozenset[str]()
+    is_row = [
+        2 * len(shared & one.keys()) > len(shared) or all(times[key] > few for key in one) or not shared
+        for one in records
+    ]
+    once = [at for at, one in enumerate(records) if not is_row[at] and kinds[frozenset(one)] == 1]
+    return is_row, once
 
 
 def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> None:
@@ -135,9 +145,13 @@ def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> No
             lists.update({name: values for name, values, _ in channels})
             units.update({name: unit for name, _, unit in channels if isinstance(unit, str)})
         else:  # a record per row
-            flat, others = _rows([_flat(row) for row in data])
-            for other in others:
-                _collect(path, other, into)
+            every = [_flat(row) for row in data]
+            is_row, once = _rows(every)
+            flat = [one for one, row in zip(every, is_row, strict=True) if row]
+            for one in once:
+                _collect(path, data[one], into, within)
+            if len(flat) < len(every):
+                into.notes.append(f"{len(every) - len(flat)} records are no rows and left out, such as a greeting")
             keys = dict.fromkeys(key for row in flat for key in row)
             check_values(path, len(keys) * len(flat), f"{len(flat)} records with {len(keys)} keys")
             for key in keys:

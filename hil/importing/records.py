@@ -49,7 +49,7 @@ def read_records(path: Path) -> Records:
     lists = content.lists
     rows = len(next(iter(lists.values()), []))
     if rows == 0 or any(len(one) != rows for one in lists.values()):
-        return Records(content)
+        return Records(content, notes=tuple(content.notes))
     places = (*range(min(rows, _SAMPLE)), *range(0, rows, max(1, rows // _SAMPLE)))
     marks = _form([[number_part(one[row]) for one in lists.values() if isinstance(one[row], str)] for row in places])
     of = find_series(tuple(lists), [[_text(one[row]) for one in lists.values()] for row in places], marks)
@@ -78,7 +78,8 @@ def _put_together(
     lists = {of.time: found.stamps.tolist()} | {name: values.tolist() for name, values in found.columns.items()}
     units = content.units | found.told | ({of.time: "s"} if found.dates else {})
     texts = {name: Cell(number(row), text) for name, (row, text) in found.texts.items()}
-    return Records(RecordColumns(lists, content.scalars, units, content.texts), found.units, texts, found.notes)
+    notes = (*content.notes, *found.notes)
+    return Records(RecordColumns(lists, content.scalars, units, content.texts), found.units, texts, notes)
 
 
 def _of_texts(content: RecordColumns, form: NumberForm) -> Records:
@@ -95,7 +96,8 @@ def _of_texts(content: RecordColumns, form: NumberForm) -> Records:
             if cells.texts:
                 row = min(cells.texts)
                 texts[name] = Cell(row + 1, cells.texts[row])
-    return Records(RecordColumns(lists, content.scalars, content.units, content.texts), units, texts)
+    columns = RecordColumns(lists, content.scalars, content.units, content.texts)
+    return Records(columns, units, texts, tuple(content.notes))
 
 
 def _text(value: object) -> str:

@@ -168,9 +168,7 @@ def unit_of_stamps(
         scaled = stamps.time.model_copy(update={"unit": "s", "scale": 1.0 / (rate[0] * step)})
         note = f"clock: the unit of {told.column!r} is not given; {rate[1]}, so that a step of {step:g} is one period"
         return replace(stamps, time=scaled, seconds=raw * scaled.scale, sure=True), note
-    unit, note = unit_by_step(told, step)
-    if not note and told.unit is None and bool(np.all(raw == np.round(raw))):  # a counter may count any clock
-        note = f"clock: the unit of {told.column!r} is not given; {unit} is taken (steps of {step:g} {unit})"
+    unit, note = unit_by_step(told, step, counts=bool(np.all(raw == np.round(raw))))
     return in_unit(unit), note
 
 
@@ -178,8 +176,11 @@ def _is_rate(step: float, unit: str) -> bool:
     return SLOWEST_HZ <= 1.0 / (step * SECONDS[unit]) <= FASTEST_HZ
 
 
-def unit_by_step(told: Label, step: float) -> tuple[str, str]:
-    """Unit of stamps with this step, and a note if it is guessed or if the name says another one."""
+def unit_by_step(told: Label, step: float, counts: bool = False) -> tuple[str, str]:
+    """Unit of stamps with this step, and a note if it is guessed or if the name says another one.
+
+    Whole numbers may be `counts` of any clock.
+    """
     plausible = [unit for unit in ("s", "ms", "us", "ns", "d") if _is_rate(step, unit)]
     slow = told.unit is not None and SLOWEST_TOLD_HZ <= 1.0 / (step * SECONDS[told.unit]) < SLOWEST_HZ
     if slow or told.unit in plausible or (told.unit is not None and not plausible):
@@ -191,6 +192,6 @@ def unit_by_step(told: Label, step: float) -> tuple[str, str]:
             f"clock: {told.column!r} says {told.unit}, but steps of {step:g} {told.unit} are no rate of a recording; "
             f"{best} is taken"
         )
-    if len(plausible) == 1:
+    if len(plausible) == 1 and not counts:
         return best, ""
     return best, f"clock: the unit of {told.column!r} is not given; {best} is taken (steps of {step:g} {best})"

@@ -74,7 +74,8 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
     told = (last[1] or last[2]) if last else ""
     if unit_named(told) and told not in names:  # else it is a header, of t, n and m
         return "", told
-    if last and last[1] and factor_and_unit(told):  # 0 cnt [1/4 us]
+    part = factor_and_unit(told) if last and last[1] and re.match(rf"[\W\d_]*{re.escape(name)}", line) else None
+    if part and part[0] < 1.0:  # 0 cnt [1/4 us]; more is a range
         return "", told
     rest = rest_of_channel(line, name)
     if rest is None:

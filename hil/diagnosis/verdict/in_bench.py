@@ -31,7 +31,8 @@ def in_bench(final: Fit, held_out: Dataset) -> str:
             told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
     delay_s = hypothesis.resolved.bench.torque_delay_s
     acts_s = (delay_s or 0.0) + 0.5 * final.bench.period_s  # the twin holds each value for a row
-    if delay_s and abs(acts_s) > max(SIGMAS * errors.get(DELAY, 0.0), final.bench.period_s):
+    error_s = SIGMAS * errors.get(DELAY, 0.0)
+    if delay_s and abs(acts_s) > max(error_s, final.bench.period_s) and DELAY not in final.at_bound:
         told.append(f"The {delay_in_words(acts_s)}.")
     for kept in hypothesis.kept:
         entry, mechanism = kept.active(), BY_ID[kept.effect]

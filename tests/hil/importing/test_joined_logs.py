@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +46,8 @@ def test_rows_are_those_of_the_slowest_in_the_time_that_all_have(tmp_path: Path,
     there = (T >= 0.5) & (np.arange(T.size) % EVERY == 0)
     assert table[STAMP] == pytest.approx(T[there] - T[there][0], abs=2e-6)
     assert table["act [mm]"] == pytest.approx(AXIS["x_act"][there], abs=1e-4)
-    assert table["torque_Nm"] == pytest.approx(AXIS["torque"][there], abs=1e-3)
+    of_row = np.convolve(AXIS["torque"], [0.125, 0.25, 0.25, 0.25, 0.125], "same")  # its mean over the row
+    assert table["torque_Nm"][2:-2] == pytest.approx(of_row[there][2:-2], abs=1e-3)
 
 
 @pytest.mark.parametrize("first", ["controller", "drive"])
@@ -61,6 +63,59 @@ def test_explain_joins_what_is_no_axis_alone(tmp_path: Path, first: str) -> None
         explain(paths if first == "controller" else paths[::-1], tmp_path / "out", look=look)
     assert "inertia at the motor 0.00200 kg m^2" in " ".join(seen)
     assert (tmp_path / "out" / f"{first}-joined.csv").is_file()
+
+
+def test_a_gap_is_left_open_a_wrap_is_counted_on_and_constants_are_kept(tmp_path: Path) -> None:
+    counts = np.floor(AXIS["angle"] / (2.0 * np.pi) * 4096) % 4096
+    lost = (T > 2.0) & (T < 3.0)
+    first, second = tmp_path / "fast.csv", tmp_path / "slow.csv"
+    content = csv_text({"t_s": T[~lost], "torque [%]": 40.0 * AXIS["torque"][~lost]})
+    first.write_text("# rated torque: 2.5 Nm\n" + content)
+    second.write_text(csv_text({"t_s": T[::EVERY], "encoder [counts]": counts[::EVERY]}))
+    join_logs([first, second], tmp_path / "joined.csv")
+    table = read_table(tmp_path / "joined.csv")
+    assert {one.value for one in table.constants.values()} == {2.5}
+    here = np.isfinite(table.columns["torque [%]"])
+    assert table.columns[STAMP][~here][[0, -1]] == pytest.approx([2.0, 3.0], abs=0.02)
+    assert np.max(np.abs(np.diff(table.columns["encoder [counts]"]))) < 2000.0
+
+
+def test_a_slow_thermometer_does_not_give_the_rows(tmp_path: Path) -> None:
+    thermometer = tmp_path / "warm.csv"
+    seconds = BEGIN + pd.to_timedelta(np.arange(1, 6), "s")
+    thermometer.write_text("stamp,temperature [degC]\n" + "".join(f"{one.isoformat()},20.5\n" for one in seconds))
+    paths = [controller(tmp_path / "a.csv"), drive(tmp_path / "b.parquet"), thermometer]
+    join_logs(paths, tmp_path / "joined.csv")
+    assert read_table(tmp_path / "joined.csv").columns[STAMP].size > 900
+
+
+@pytest.mark.parametrize("dated", [True, False])
+def test_beside_a_whole_recording_only_dates_tell_loggers_of_one_run(tmp_path: Path, dated: bool) -> None:
+    whole, other = tmp_path / "whole.csv", drive(tmp_path / "drive.parquet")
+    whole.write_text(csv_text({"t_s": T, "x_mm": AXIS["x_act"], "torque_Nm": AXIS["torque"]}))
+    paths = [controller(tmp_path / "a.csv"), other] if dated else [whole, other]
+    if dated:
+        join_logs(paths, tmp_path / "joined.csv", one_is_whole=True)
+        return
+    with pytest.raises(InputError, match=r"one lacks the position or the torque, another has both"):
+        join_logs(paths, tmp_path / "joined.csv", one_is_whole=True)
+
+
+def test_one_map_serves_files_whose_drafts_say_the_same(tmp_path: Path) -> None:
+    columns = {"t_s": T, "x [mm]": AXIS["x_act"], "torque [Nm]": AXIS["torque"]}
+    files = {"one.csv": columns, "two.csv": columns, "rad.csv": {**columns, "torque [mNm]": 1e3 * AXIS["torque"]}}
+    del files["rad.csv"]["torque [Nm]"]
+    for name, one in files.items():
+        (tmp_path / name).write_text(csv_text(one))
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="lead_m"):
+        explain(tmp_path / "one.csv", out)
+    text = (out / "one-map.yaml").read_text()
+    (out / "one-map.yaml").write_text(re.sub(r"^lead_m:.*", "lead_m: 0.010", text, flags=re.MULTILINE))
+    with pytest.raises(InputError, match=r"(?s)rad\.csv: .*lead_m"):
+        explain([tmp_path / "one.csv", tmp_path / "two.csv", tmp_path / "rad.csv"], out)
+    assert not (out / "two-map.yaml").exists()
+    assert (out / "rad-map.yaml").exists()
 
 
 def test_loggers_of_two_runs_and_files_without_stamps_are_refused(tmp_path: Path) -> None:

@@ -75,14 +75,15 @@ def test_greetings_and_heartbeats_in_a_stream_of_records_are_no_rows(tmp_path: P
         {"type": "d", "ts": stamps_ms[row], "q_rad": AXIS["angle"][row], "i_a": AXIS["torque"][row]}
         for row in range(AXIS["t"].size)
     ]
-    del rows[700]["i_a"]
-    beats = [{"type": "hb", "ts": stamps_ms[row] + 1.0, "up": row} for row in (1000, 2000)]
+    rows[700] = {"type": "d", "ts": stamps_ms[700], "q_rad": AXIS["angle"][700], "fault": 3}
+    beats = [{"type": "hb", "ts": stamps_ms[row] + 1.0, "up": row, "fs": 100} for row in (1000, 2000)]
     stream = [{"type": "hello", "rate_hz": 250}, *rows[:1500], *beats, *rows[1500:]]
     path = tmp_path / "gateway.jsonl"
     path.write_text("\n".join(map(json.dumps, stream)) + "\n")
     draft = draft_map(path)
     assert draft.table.columns["ts"].size == len(rows)
-    assert draft.table.scalars["rate_hz"] == 250.0
+    assert draft.table.scalars == {"rate_hz": 250.0}
+    assert "3 records are no rows and left out, such as a greeting" in draft.unsure
     assert draft.clock.time is not None
     assert (draft.clock.time.column, draft.clock.time.unit) == ("ts", "ms")
 

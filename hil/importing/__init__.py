@@ -24,6 +24,7 @@ units and signs      unit_choice, usual_values, encoder_counts, position_units, 
                      effort_entry, speed_unit, channel_entries
 map                  map_file (its keys), questions, map_draft, draft_map,       `MapDraft`, the YAML file
                      map_text
+loggers of one run   joined_logs                                                 one .csv of all channels
 recording            by_map                                                      `Recording`
 
 A drafted map is applied like any other: `by_map` knows nothing of how it came about.

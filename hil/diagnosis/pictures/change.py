@@ -32,10 +32,10 @@ def change_figure(diagnosis: Diagnosis) -> Drawing:
         raise InputError("change: the axis did not change between or during these recordings")
     figure = Drawing(WIDTH_IN, 1.0 + 2.4 * len(change.runs))
     axes = figure.subplots(len(change.runs), 1, squeeze=False)[:, 0]
-    nominal = diagnosis.nominal
+    whole = diagnosis.reported.judged.final if change.explains_all else diagnosis.nominal
     for axis, run in zip(axes, change.runs, strict=True):
         channel = "motor" if run.observability.torque_measured else "table"
-        before = _residual(nominal.on(diagnosis.train.over([run])), channel)
+        before = _residual(whole.on(diagnosis.train.over([run])), channel)
         after = np.full(run.motor.size, np.nan)
         for part in change.parts:
             for own in (one for one in part.data.runs if one.name == run.name):

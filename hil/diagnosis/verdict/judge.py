@@ -49,9 +49,10 @@ def judge(tested: Tested) -> Judged:
     named = of_plant is Verdict.MISSING_PHYSICS
     open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
-    moves = any(one.question.change for one in beside)
+    moves, whole = any(one.question.change for one in beside), refit.fit
     if open_ones or (moves and not searched.stopped_at):
-        change = _better(changed(_with_loads(refit.fit, final), held_out, moves), searched.nominal, final, held_out)
+        whole = _with_loads(refit.fit, final)
+        change = _better(changed(whole, held_out, moves), searched.nominal, final, held_out)
     if change and named and not _needs_less_torque(change, final):
         change = None
     if change and change.explains_all:
@@ -60,7 +61,7 @@ def judge(tested: Tested) -> Judged:
     is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
         as_given = of_plant is Verdict.NO_MISMATCH and given_stands(searched.given, held_out)
-        final = searched.given if as_given else refit.fit
+        final = searched.given if as_given else whole if of_plant is Verdict.AXIS_CHANGED else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
     before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
     of_parts = change.parts if change and change.explains_all else ()

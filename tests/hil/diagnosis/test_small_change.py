@@ -56,3 +56,21 @@ def test_the_sign_of_a_structure_is_that_of_the_torque_that_the_axis_needs(tmp_p
     assert float(np.mean(left.left[left.rows] * way)) > 0.1 * COULOMB_N_M
     told = [one.in_words("N m") for one in structure_left(fit, prepared.held_out) if one.channel == TORQUE]
     assert any("the Coulomb friction is" in one and "larger than before" in one for one in told)
+
+
+def test_a_weight_that_the_bench_has_not_may_change_at_a_moment(tmp_path: Path) -> None:
+    """A weight throughout, and more of it and of the inertia from a moment on: its value in each part is told."""
+    after = np.arange(ROWS) >= AT
+    columns = axis(ROWS, inertia_kg_m2=np.where(after, 1.3, 1.0) * INERTIA_KG_M2)
+    columns["torque"] += np.where(after, 1.3, 0.9) + np.random.default_rng(5).normal(0.0, NOISE_N_M, ROWS)
+    path = write(tmp_path / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
+    found = explain([path], tmp_path / "out").diagnosis
+    change = found.result.change
+    assert found.result.verdict == "axis_changed"
+    assert change is not None
+    assert change.moment_s == pytest.approx(1e-3 * AT, abs=0.3)
+    load = next(one.values for one in change.parameters if "load_torque" in one.name)
+    assert [one.value for one in load] == pytest.approx([0.9, 1.3], abs=0.05)
+    assert "already" not in found.result.statement
+    (panel, *_) = found.plot("change").axes
+    assert abs(float(np.median(panel.lines[0].get_ydata()))) < 0.5

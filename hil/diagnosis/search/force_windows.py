@@ -21,6 +21,7 @@ from scipy.stats import t as student
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.event_detection import Event
+from hil.diagnosis.wording import whole_name
 from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -92,9 +93,12 @@ def strength_told(without: Fit, term: Term, data: Dataset) -> bool:
 
 
 def _groups(data: Dataset) -> list[list[Measured]]:
-    """The parts of one recording, in order of time, or each recording."""
-    ordered = in_turn(data.runs)
-    return [ordered] if ordered else [[run] for run in data.runs]
+    """The parts of each recording, in order of time; all runs together if one follows the other."""
+    if ordered := in_turn(data.runs):
+        return [ordered]
+    names = dict.fromkeys(whole_name(run.name) for run in data.runs)
+    parts = [[run for run in data.runs if whole_name(run.name) == name] for name in names]
+    return [group for one in parts for group in ([in_turn(one)] if in_turn(one) else [[run] for run in one])]
 
 
 def _uncut(edges: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -128,6 +128,14 @@ def test_a_push_is_found_in_whichever_part_it_is(place: float) -> None:
     assert term.at(term.windows[0])[0] == pytest.approx(300.0, rel=0.2)
 
 
+def test_parts_are_put_together_by_recording() -> None:
+    first, last = pushed(300.0, 0.45 * DURATION_S, 0.6 * DURATION_S)
+    others = [replace(one, name=one.name.replace("run", "other")) for one in parts(RUN, 0.5)]
+    fit = evaluated(Hypothesis(OWNER), dataset([first, others[0]], OWNER))
+    events = torque_windows(fit, fit.data.over([first, others[0], last, others[1]]))
+    assert [one.run for one in events] == [first.name, last.name]  # a window over the cut is one in each part
+
+
 def test_events_carry_the_force_on_the_axis_and_not_the_torque_that_the_drive_needs() -> None:
     first, last = pushed(300.0, 0.2 * DURATION_S, 0.35 * DURATION_S)
     fit = evaluated(Hypothesis(OWNER), dataset([first], OWNER))

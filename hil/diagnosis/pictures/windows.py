@@ -41,8 +41,10 @@ def force_over_time(diagnosis: Diagnosis, views: Sequence[View]) -> Captioned:
         for values, (label, colour, width, alpha) in zip(curves, looks, strict=True):
             time_s, drawn = run.time_s[rows][chosen], values[rows][chosen]
             axis.plot(time_s, drawn, color=colour, linewidth=width, alpha=alpha, label=label)
-        for window in (one for one in view.term.windows if one.run == run.name):
-            axis.axvspan(*view.term.edges(window), color=DEVIATION, alpha=0.15, linewidth=0.0)
+        first_s, last_s = run.time_s[rows][[0, -1]].tolist()
+        for start_s, end_s in (view.term.edges(one) for one in view.term.windows if one.run == run.name):
+            if start_s < last_s and end_s > first_s:
+                axis.axvspan(max(start_s, first_s), min(end_s, last_s), color=DEVIATION, alpha=0.15, linewidth=0.0)
         strongest = max((abs(force) for force, *_ in view.term.windows_of(run.name)), default=0.0)
         if strongest > 0.0:  # peaks at reversals would hide the windows
             axis.set_ylim(-1.6 * strongest, 1.6 * strongest)

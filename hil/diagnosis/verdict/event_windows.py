@@ -187,7 +187,7 @@ def _different(seen: Sequence[Seen]) -> int:
 
 
 def _against_motion(seen: Sequence[Seen]) -> bool:
-    """True if windows of one strength are each against the way that the motor goes in them, both ways, by no chance."""
+    """True if windows of one strength are each against the motion of the motor, in both ways, beyond chance."""
     moved = list[float]()
     for run, (start_s, end_s, _) in ((one.run, one.values) for one in seen):
         inside = run.motor[(run.time_s >= start_s) & (run.time_s <= end_s)]

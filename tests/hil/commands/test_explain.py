@@ -89,10 +89,10 @@ def test_an_option_of_another_draft_is_refused_where_a_map_is(explained: tuple[P
     assert "axis-map.yaml: it is there already and was not drafted with --rate 500" in ran.stderr.replace("\n", " ")
 
 
-def test_files_of_one_name_have_a_map_each(tmp_path: Path) -> None:
-    for name in ("first", "second"):
+def test_files_of_one_name_and_other_units_have_a_map_each(tmp_path: Path) -> None:
+    for name, unit, factor in (("first", "[Nm]", 1.0), ("second", "[mNm]", 1e3)):
         (tmp_path / name).mkdir()
-        written(tmp_path / name)
+        written(tmp_path / name, unit, factor)
     ran = hil(tmp_path, "explain", "first/axis.csv", "second/axis.csv", "--out", "both", "--budget", "5")
     assert ran.returncode == 0, ran.stderr
     assert {path.name for path in (tmp_path / "both").glob("*-map.yaml")} == {

@@ -159,13 +159,16 @@ def channels(data: Dataset) -> list[str]:
     return [*([TORQUE] if torque else []), *([DIFFERENCE] if data.runs[0].table_m.size else [])]
 
 
-def left_in_channel(hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel) -> list[ResidualSeries]:
-    """Residuals of a channel and the rows in which the axis slides, for each run."""
+def left_in_channel(
+    hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel, fast: bool = False
+) -> list[ResidualSeries]:
+    """Residuals of a channel and the rows in which the axis slides, for each run; `fast`: with the steps of a search."""
     if channel == TORQUE:
-        return needed_torque(hypothesis, data, plain)
+        return needed_torque(hypothesis, data, plain, fast)
     return [
-        ResidualSeries(hypothesis.blocks(run, data.observer_s)["table"], measured_motion(run).sliding(plain.slowest))
+        ResidualSeries(left["table"], measured_motion(run).sliding(plain.slowest))
         for run in data.runs
+        for left in [hypothesis.blocks(run, data.observer_s, fast)]
     ]
 
 

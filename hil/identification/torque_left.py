@@ -17,8 +17,8 @@ between stretches that slide, where the sign of the velocity is not known, it go
 """
 
 import math
-from collections.abc import Collection, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Collection, Sequence
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,21 +124,23 @@ def left_by_twin(
     return _share(left, data, plain.slowest, deviation)
 
 
-def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[ResidualSeries]:
+def needed_torque(
+    hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast: bool = False
+) -> list[ResidualSeries]:
     """Torque (n,) that the measured motion of each run needs beyond that of a twin; NaN where it does not hold it.
 
-    Rows in which the axis slides count.
+    Rows in which the axis slides count. `fast`: with the internal steps of a search.
     """
     found = []
     for run in data.runs:
         motion = measured_motion(run)
         rows = motion.sliding(plain.slowest)
-        found.append(ResidualSeries(-_lacking(hypothesis, run, data.observer_s, motion, rows), rows))
+        found.append(ResidualSeries(-_lacking(partial(_innovation, hypothesis, run, data.observer_s, fast), run, motion, rows), rows))
     return found
 
 
 def _lacking(
-    hypothesis: Hypothesis, run: Measured, observer_s: float, motion: MotionData, rows: NDArray[np.bool_]
+    innovation_with: Callable[[FloatArray], FloatArray], run: Measured, motion: MotionData, rows: NDArray[np.bool_]
 ) -> FloatArray:
     """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,); NaN where no torque moves it.
 
@@ -149,8 +151,8 @@ def _lacking(
     more, added, noise = np.zeros(run.motor.size), _ADDED * deviation * way, run.noise.torque
     found, before = np.full(run.motor.size, np.nan), np.count_nonzero(rows) + 1
     for _ in range(_AGAIN):
-        innovation = _innovation(hypothesis, run, observer_s, more)
-        moved = (innovation - _innovation(hypothesis, run, observer_s, more + added)) * way
+        innovation = innovation_with(more)
+        moved = (innovation - innovation_with(more + added)) * way
         scale = float(np.quantile(moved[rows], _SLIDE)) if rows.any() else 0.0
         sticks = rows & (moved < 0.5 * scale)
         if not scale > 0.0 or np.count_nonzero(sticks) >= before:
@@ -163,9 +165,11 @@ def _lacking(
     return np.asarray(found, dtype=np.float64)
 
 
-def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray) -> FloatArray:
+def _innovation(
+    hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray
+) -> FloatArray:
     """Measured less simulated motor position (n,) of a twin held on it, with more torque (n,) than the measured one."""
-    measured, held = held_on_motor(hypothesis, run, observer_s, more)
+    measured, held = held_on_motor(hypothesis, run, observer_s, more, fast)
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 

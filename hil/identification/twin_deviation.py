@@ -120,14 +120,14 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
 
 
 def held_on_motor(
-    hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray | float = 0.0
+    hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray | float = 0.0, fast: bool = False
 ) -> tuple[Response, Response]:
     """Measured channels, lateness undone, and those of the twin held on the motor, driven by the measured torque.
 
-    It gets `more` torque (n,), by default none.
+    It gets `more` torque (n,), by default none. `fast`: with the internal steps of a search.
     Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
-    twin = hypothesis.twin(observer_s, run=run)
+    twin = hypothesis.twin(observer_s, fast, run)
     measured = hypothesis.undelayed(twin, run)
     mechanical = tuple(active for active in twin.active if not in_measured_torque(active))
     driven = measured.torque + more

@@ -70,7 +70,7 @@ def _with_those_of(held_out: Dataset, final: Fit, told: Sequence[Event]) -> Fit:
     """
     index, at = event_index(final), final.hypothesis
     before = replace(final.estimator, data=held_out).evaluate(at)
-    if index is None and not told and before.within_noise:
+    if index is None and not told and (before.within_noise or before.at_floor):
         return final
     plain = before.estimator.evaluate(at.without(*range(len(at.terms))))
     # terms may depend on the motion, which strong events disturb: some show only beside the nominal twin
@@ -101,7 +101,8 @@ def _best(before: Fit, told: Sequence[Term], shown: Sequence[Term], own: bool) -
     at, index = before.hypothesis, event_index(before)
     longer = [at.with_term(one) if index is None else joined(at, index, one) for one in (*told, *shown)]
     begun = [before.estimator.evaluate(one) for one in longer]
-    fits = [trimmed(completed(fit_windows(one, others=own), others=own), others=own) for one in begun]
+    better = [one for one in begun if one.cost < before.cost]  # windows of another cause make it worse
+    fits = [trimmed(completed(fit_windows(one, others=own), others=own), others=own) for one in better]
     evidence, best = CRITERIA.evidence, None
     for fitted in (*fits, *begun[: len(told)]):
         if event_index(fitted) is None or fitted.hypothesis.x.size != longer[0].x.size:

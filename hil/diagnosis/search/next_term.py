@@ -77,9 +77,10 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         step("fitting mechanisms that springs may hide from the springs of the bench file")
         additions = ordered([*additions, search.addition(unbent(base))])
         best = first_standing(additions)
-    # a refit that ends at its bounds may have been led astray by what is missing
-    astray = not base.terms and bool(set(base.at_bound).intersection(base.hypothesis.nominal))
-    if (best is None or astray) and not base.at_floor and search.unfinished:
+    # a refit that ends at its bounds may have been led astray by what is missing; a term that explains all was not
+    stuck = not base.terms and bool(set(base.at_bound).intersection(base.hypothesis.nominal))
+    astray = best is None or (stuck and not best.fit.at_floor)
+    if astray and not base.at_floor and search.unfinished:
         step("searching again beside the parameters of the bench file")
         additions = ordered([*additions, *possible(from_bench_file(base))])
         best = first_standing(additions)

@@ -59,9 +59,10 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
 
     By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than what correct
     simulations of one axis differ by, and for a `fitted` shape that leaves more at its own size: of the size c the term
-    has 1, and removes (2 c - 1) / c^2 of what the shape removes.
+    has 1, and removes (2 c - 1) / c^2 of what the shape removes. Others are simulated with the steps of a search.
     """
-    asked, best = _asked(without), 0.0
+    fast = not fitted
+    asked, best = _asked(without, fast), 0.0
     if asked is None:
         return best
     added = _added(found, without)
@@ -69,7 +70,7 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
     # then one is the shape, and no nuisance
     offset = any(Active(term.effect, term.values, term.variant).is_offset for term in added)
     for channel, own in asked.channels.items():
-        after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain), own.rows)
+        after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain, fast), own.rows)
         shape = own.quiet - after
         if not _holds(shape):
             continue
@@ -142,25 +143,29 @@ class _Asked(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def _asked(without: Fit) -> _Asked | None:
-    """Residuals of a fit, for the test of each mechanism's shape; None if the axis slides in no row."""
+def _asked(without: Fit, fast: bool) -> _Asked | None:
+    """Residuals of a fit, for the test of each mechanism's shape; None if the axis slides in no row.
+
+    `fast`: with the internal steps of a search.
+    """
     data, hypothesis, found = without.data, without.hypothesis, dict[str, _Seen]()
     plain = fit_plain(data)
     if plain is None:
         return None
     quiet = data.over([one.smooth for one in data.apart] or smoothed_runs(data.runs, plain))
     for channel in channels(data):
-        parts = left_in_channel(hypothesis, data, channel, plain)
+        parts = left_in_channel(hypothesis, data, channel, plain, fast)
         rows = [one.rows for one in parts]
         measured = _joined(parts, rows)
-        own = _joined(left_in_channel(hypothesis, quiet, channel, plain), rows)
+        own = _joined(left_in_channel(hypothesis, quiet, channel, plain, fast), rows)
         if measured.size < _FEWEST_ROWS or not (_holds(measured) and _holds(own)):
             continue
         beside = [np.ones_like(measured)]
         if channel == TORQUE:
             moved = [plain_columns(measured_motion(run).moved) for run in data.runs]
             beside += [np.concatenate([one[name][at] for one, at in zip(moved, rows, strict=True)]) for name in MOTION]
-        changed = (_joined(left_in_channel(one, quiet, channel, plain), rows) - own for one in _other_values(without))
+        other = (left_in_channel(one, quiet, channel, plain, fast) for one in _other_values(without))
+        changed = (_joined(one, rows) - own for one in other)
         beside += [change for change in changed if _holds(change)]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
         columns = np.column_stack(beside)
@@ -260,7 +265,7 @@ def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
         begun = (base.hypothesis.with_term(term) for term in (one.term, *one.others))
         return min(log_chance_of_shape(start, base, fitted=False) for start in begun)
 
-    _asked(base)  # once, before the jobs ask for it
+    _asked(base, fast=True)  # once, before the jobs ask for it
     found = zip(in_parallel([partial(chance, one) for one in candidates]), candidates, strict=True)
     level = [(least, one) for least, one in found if least < math.log(CRITERIA.significance)]
     return [one for _, one in sorted(level, key=lambda pair: pair[0])]

@@ -162,7 +162,7 @@ def channels(data: Dataset) -> list[str]:
 def left_in_channel(
     hypothesis: Hypothesis, data: Dataset, channel: str, plain: PlainModel, fast: bool = False
 ) -> list[ResidualSeries]:
-    """Residuals of a channel and the rows in which the axis slides, for each run; `fast`: with the steps of a search."""
+    """Residuals of a channel and the rows in which the axis slides, for each run; `fast`: in the steps of a search."""
     if channel == TORQUE:
         return needed_torque(hypothesis, data, plain, fast)
     return [

@@ -124,9 +124,7 @@ def left_by_twin(
     return _share(left, data, plain.slowest, deviation)
 
 
-def needed_torque(
-    hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast: bool = False
-) -> list[ResidualSeries]:
+def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast: bool = False) -> list[ResidualSeries]:
     """Torque (n,) that the measured motion of each run needs beyond that of a twin; NaN where it does not hold it.
 
     Rows in which the axis slides count. `fast`: with the internal steps of a search.
@@ -135,7 +133,8 @@ def needed_torque(
     for run in data.runs:
         motion = measured_motion(run)
         rows = motion.sliding(plain.slowest)
-        found.append(ResidualSeries(-_lacking(partial(_innovation, hypothesis, run, data.observer_s, fast), run, motion, rows), rows))
+        innovation_with = partial(_innovation, hypothesis, run, data.observer_s, fast)
+        found.append(ResidualSeries(-_lacking(innovation_with, run, motion, rows), rows))
     return found
 
 
@@ -165,9 +164,7 @@ def _lacking(
     return np.asarray(found, dtype=np.float64)
 
 
-def _innovation(
-    hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray
-) -> FloatArray:
+def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray) -> FloatArray:
     """Measured less simulated motor position (n,) of a twin held on it, with more torque (n,) than the measured one."""
     measured, held = held_on_motor(hypothesis, run, observer_s, more, fast)
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)

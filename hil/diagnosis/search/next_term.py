@@ -48,12 +48,22 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     A torque that is sampled, or the only one recorded, drives the twin with its error: terms that pass less of it leave
     less than the noise, so that below the floor nothing but the shape of a term is evidence.
     """
-    base, considered = search.base, list[Considered]()
+    base, considered, additions = search.base, list[Considered](), list[Addition]()
 
     def possible(fits: Sequence[Fit]) -> list[Addition]:
         begun = [search.addition(fit) for fit in fits]
         considered.extend(one.considered for one in begun if not one.possible)
         return ordered([one for one in begun if one.possible])
+
+    def pairs(one: Addition) -> list[Addition]:
+        other = None if one.fit.at_floor or not search.unfinished else companion(base, one.fit)
+        if other is None:
+            return []
+        step(f"fitting {one.fit.terms[-1].effect} together with {other.effect}")
+        found = possible(together(base, one.fit, other))
+        clear = [pair for pair in found if pair.fit.cost < CRITERIA.clear * one.fit.cost]
+        considered.extend(pair.considered for pair in found if pair not in clear)
+        return clear
 
     if base.within_noise:
         promising = shown(base, candidates)
@@ -61,7 +71,6 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
             return Additions([], None)
     else:
         promising = [one for one in candidates if promises(one.by_channel, base.residuals.by_channel)]
-    additions = list[Addition]()
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
         additions = possible(race(base, promising))
@@ -77,6 +86,9 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         step("fitting mechanisms that springs may hide from the springs of the bench file")
         additions = ordered([*additions, search.addition(unbent(base))])
         best = first_standing(additions)
+    if best is None and additions:  # neither of two that belong together may stand without the other
+        additions = ordered([*additions, *pairs(min(additions, key=lambda one: one.fit.cost))])
+        best = first_standing(additions)
     # a refit that ends at its bounds may have been led astray by what is missing; a term that explains all was not
     stuck = not base.terms and bool(set(base.at_bound).intersection(base.hypothesis.nominal))
     astray = best is None or (stuck and not best.fit.at_floor)
@@ -84,12 +96,8 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         step("searching again beside the parameters of the bench file")
         additions = ordered([*additions, *possible(from_bench_file(base))])
         best = first_standing(additions)
-    if best is not None and not best.fit.at_floor and search.unfinished and (other := companion(base, best.fit)):
-        step(f"fitting {best.fit.terms[-1].effect} together with {other.effect}")
-        pairs = possible(together(base, best.fit, other))
-        clear = [pair for pair in pairs if pair.fit.cost < CRITERIA.clear * best.fit.cost]
-        considered += [pair.considered for pair in pairs if pair not in clear]
-        additions = ordered([*additions, *clear])
+    if best is not None:
+        additions = ordered([*additions, *pairs(best)])
         best = first_standing(additions)
     return Additions(additions, best, tuple(considered))
 

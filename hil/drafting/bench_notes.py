@@ -107,8 +107,8 @@ def _of_torque(
             f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "
             f"+-{plant.one_way.std_error:.2g}: record the way back"
         )
-    sure = "; see mechanisms of the bench" if plant.offset_held else "; not in the bench"
-    sure = sure if plant.offset.significant else ", not distinguishable from 0"
+    known = "; not in the bench" if plant.offset.significant else ", not distinguishable from 0"
+    sure = "; see mechanisms of the bench" if plant.offset_told else known
     notes.append(
         f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
         "friction that differs by direction"

@@ -169,14 +169,10 @@ def _dc_motor(draft: BenchDraft, plant: PlantValues, lead: Estimate) -> None:
 
 
 def _loads(draft: BenchDraft, plant: PlantValues) -> None:
-    """Constant torque that friction holds, and gravity over the angle, as mechanisms of the bench.
-
-    Such an offset has many causes: a load, friction that differs by direction, a zero of the drive. One above friction
-    moves the axis: it is left to a diagnosis.
-    """
-    if plant.offset_held:
+    """Constant torque, and gravity over the angle, as mechanisms of the bench: both are as common as friction."""
+    if plant.offset_told:
         (name,) = (parameter.name for parameter in constant_load.MECHANISM.parameters)
-        held = "below friction: a load, friction that differs by direction, or a zero of the drive"
+        held = "a load, friction that differs by direction, or a zero of the drive"
         draft.mechanisms[constant_load.MECHANISM.id] = [_value(name, plant.offset, "at the motor", held)]
     if plant.gravity is not None and plant.gravity_angle is not None and plant.gravity.significant:
         torque, angle = (parameter.name for parameter in gravity_torque.MECHANISM.parameters)

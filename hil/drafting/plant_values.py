@@ -43,10 +43,9 @@ class PlantValues:
     early_s: Estimate | None = None
 
     @property
-    def offset_held(self) -> bool:
-        """True for a constant torque that friction holds; one above it moves the axis."""
-        told = self.offset.significant and self.one_way is None
-        return told and abs(self.offset.value) < self.coulomb.value
+    def offset_told(self) -> bool:
+        """True for a constant torque that the motion tells from none, and from friction."""
+        return self.offset.significant and self.one_way is None
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ _MISSING = ("_FillValue", "missing_value")
 
 
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """Datasets and fields of tables by name, texts, and attributes of the root.
+    """Datasets and fields of tables by name, texts, and attributes of their groups and of the root.
 
     Units, factors and missing values are those of the attributes of a dataset. Links to other files are not followed.
     Raises InputError: damaged, too many values, or h5py is not installed.
@@ -35,7 +35,10 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
                 groups.setdefault(folder, []).append(one)
         read = [group for name, members in groups.items() for group in _groups(library, name, members)]
         scalars = (str, int, float, np.integer, np.floating)
-        texts = {name: np.array(value) for name, value in file.attrs.items() if isinstance(value, scalars)}
+        owners = [file, *(file[name] for name in groups if isinstance(file[name], library.Group))]
+        texts = {
+            name: np.array(value) for one in owners for name, value in one.attrs.items() if isinstance(value, scalars)
+        }
     arrays, units = one_length(path, read)
     return texts | arrays, units
 

@@ -40,8 +40,14 @@ class ListedScales:
 
 
 def rest_of_channel(line: str, name: str) -> str | None:
-    """Text of a line behind the `name` of a channel with which it begins; None if it begins otherwise."""
-    match = re.match(rf"[\s\"#%/;!]*{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$", line)
+    """Text of a line behind the `name` of a channel with which it begins, perhaps after a word such as "Channel 1";
+    None if it begins otherwise."""
+    match = re.match(
+        rf"[\s\"#%/;!]*(?:(?:{'|'.join(lexicon().enumerated)})\s*\d*\"?\s*[:=;,\t|]\s*\"?)?"
+        rf"{re.escape(name)}\"?\s*[:=;,\t|]\s*(.*)$",
+        line,
+        re.IGNORECASE,
+    )
     return match[1] if match else None
 
 

@@ -66,7 +66,7 @@ def described(lines: Sequence[str], names: Sequence[str], of_units: bool = False
 def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | None:
     """Words and unit of a line that begins with a column's name, or ends with it and a unit.
 
-    "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"; "COL 3  POS.ACT  mm".
+    "CH1: motor speed (0.1 rpm)", "CH2,Torque,5V,N m"; "COL 3  POS.ACT  mm"; "Channel 1","PosAct","mm","1".
     """
     last = re.search(
         rf"(?<![\w.]){re.escape(name)}\"?[\s:=;,|]+(?:[\[({{]([^\])}}]+)[\])}}]|([^\s;,|\])}}]+)[\])}}]?)\s*$", line
@@ -83,8 +83,11 @@ def _of_one(line: str, name: str, names: Sequence[str]) -> tuple[str, str] | Non
     bracket = _BRACKET.search(rest)
     if bracket and (unit_named(bracket[1]) or factor_and_unit(bracket[1])):
         return rest[: bracket.start()].strip(), bracket[1]
-    fields = fields_of(rest)
+    word = re.compile(lexicon().rows[RowKind.UNITS])
+    fields = [one for one in fields_of(rest) if not word.fullmatch(one.lower().replace("_", " "))]
     units = {place: unit for place, field in enumerate(fields) if place and (unit := _unit_of_field(field))}
+    if not units and fields and unit_named(fields[0]) and fields[0] not in names:
+        return "", fields[0]
     if not units:
         return None
     plain = [place for place, unit in units.items() if unit_named(unit)]

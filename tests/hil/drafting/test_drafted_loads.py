@@ -1,4 +1,4 @@
-"""A draft has the constant torque that friction holds; a larger one is left to a diagnosis."""
+"""A draft has the constant torque that the motion tells, below friction or above it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,8 @@ from hil.commands.import_ import import_
 AXIS = axis(rows=8000)
 
 
-@pytest.mark.parametrize(("share", "drafted_load"), [(0.2, True), (0.0, False), (1.5, False)])
-def test_a_constant_torque_that_friction_holds_is_in_the_draft(
-    tmp_path: Path, share: float, drafted_load: bool
-) -> None:
+@pytest.mark.parametrize(("share", "drafted_load"), [(0.2, True), (0.0, False), (1.5, True)])
+def test_a_constant_torque_is_in_the_draft(tmp_path: Path, share: float, drafted_load: bool) -> None:
     offset = share * COULOMB_N_M
     shifted = AXIS | {"torque": AXIS["torque"] + offset}
     columns = renamed(shifted, t="time_s", angle="motor_angle_rad", torque="torque_Nm")

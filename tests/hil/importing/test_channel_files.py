@@ -121,6 +121,18 @@ def test_groups_of_other_rates_are_merged_by_their_stamps(ending: str, tmp_path:
     np.testing.assert_allclose(recording["torque_n_m"][::4], TORQUE[:rows:4], atol=1e-9)
 
 
+@pytest.mark.parametrize("at", ["/", "AxisX"])
+def test_the_rate_is_an_attribute_of_the_group_or_of_the_file(at: str, tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        group = file.create_group("AxisX")
+        for name, values, unit in (("angle", ANGLE, "rad"), ("torque", TORQUE, "Nm")):
+            group.create_dataset(name, data=values).attrs["unit"] = unit
+        file[at].attrs["sample_rate_Hz"] = 1000.0
+    assert imported(path).period_s == pytest.approx(1e-3)
+
+
 @pytest.mark.parametrize("library", [pytest.param("h5py", marks=needs(".h5"))])
 def test_matlab_files_of_version_7_3_are_read_as_the_hdf5_that_they_are(library: str, tmp_path: Path) -> None:
     path = tmp_path / "axis.mat"

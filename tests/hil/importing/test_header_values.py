@@ -21,6 +21,7 @@ AXIS = axis()
         ("Abtastrate;800 Hz", Constant.RATE, 800.0),
         ("# recorded with a sampling rate of 1 kHz, 3 axes", Constant.RATE, 1000.0),
         ("Sampling interval: 0.5 ms", Constant.RATE, 2000.0),
+        ("Group\tLeg3\twf_increment\t0.002", Constant.RATE, 500.0),
         ("Fréquence d'échantillonnage : 2 kHz", Constant.RATE, 2000.0),
         ('"Torque constant: 0.8 Nm/A"', Constant.TORQUE, 0.8),
         ("Constante de par: 0,42 N·m/A", Constant.TORQUE, 0.42),

@@ -70,6 +70,17 @@ def test_a_line_for_each_column_may_end_with_its_unit() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "line",
+    ['"Channel {number}","{name}","{unit}","1"', "Channel\t{name}\tunit_string\t{unit}", "CH {number}; {name}; {unit}"],
+)
+def test_a_line_for_each_column_may_begin_with_the_word_of_a_channel(line: str) -> None:
+    units = {"PosSet": "mm", "PosAct": "mm", "SpeedAct": "rpm"}
+    lines = [line.format(number=k, name=name, unit=unit) for k, (name, unit) in enumerate(units.items(), 1)]
+    told = described([*lines, "PosSet PosAct SpeedAct"], list(units))
+    assert {name: unit for name, (_, unit) in told.items()} == units
+
+
 @pytest.mark.parametrize("line", ["c1,c2,c3", "c1 was 5 mm, c2 = 3 s", "about c1 and c2"])
 def test_prose_describes_no_column(line: str) -> None:
     assert described([line], ["c1", "c2", "c3"]) == {}

@@ -25,6 +25,7 @@ _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
 _BINS = 400  # of the travel, for zones of friction
 _ORDERS = np.arange(1, 161)  # of the motor angle: slots, pole passings, and their common multiples
 _FEWEST_ROWS, _MOST_ROWS = 100, 20_000  # for orders
+_SLOW = 0.05  # of the rows tell an order: most rows of a fast axis do not show a fine ripple
 _SLOWER, _REPEATS = 1.1, 4.0  # turns of the motor beyond its own, and periods over the travel, of what turns slower
 
 
@@ -125,8 +126,11 @@ def other_orders(runs: Sequence[Measured], disturbances: Sequence[Disturbance], 
     if not rates.size or not np.any(rates):
         return []
     angle, torque = np.concatenate(turns), np.concatenate([d.torque[d.sliding] for d in disturbances])
-    highest, shortest = 1.0 / float(_ORDERS[-1]), float(np.median(rates)) / _PASS_HZ
-    found = strongest_periods(angle, torque, shortest / 4.0, shortest, 1, highest) if shortest < highest else []
+    found, order = list[float](), float(_ORDERS[-1])
+    while (slow := 2.0 * order * rates < _PASS_HZ).mean() > _SLOW:  # an octave, where the axis is slow enough for it
+        peaks = strongest_periods(angle[slow], torque[slow], 0.125 / order, 0.5 / order, 1, 1.0 / order)
+        found += [1.0 / whole for one in peaks for whole in dict.fromkeys((1.0 / one, float(round(1.0 / one))))]
+        order *= 2.0
     longest = float(np.ptp(angle)) / _REPEATS
     if longest > _SLOWER:
         found += strongest_periods(angle, torque, _SLOWER / 32.0, _SLOWER, 1, longest)

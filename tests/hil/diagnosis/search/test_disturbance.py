@@ -97,6 +97,15 @@ def test_a_ripple_finer_than_160_per_turn_is_found_within_less_than_a_turn() -> 
     assert other_orders([run], [still], 1.0) == []
 
 
+def test_a_ripple_finer_than_160_per_turn_is_found_where_a_fast_axis_is_slow() -> None:
+    velocity = np.repeat([1.0, 30.0, -1.2, -30.0], 5000)  # rad/s: most rows pass the ripple faster than a row
+    angle = np.cumsum(velocity) * 1e-3
+    noise = np.random.default_rng(3).normal(0.0, 1.0, angle.size)
+    ripple = Disturbance(np.sin(200.0 * angle) * (np.abs(velocity) < 2.0) + noise, velocity, np.ones(angle.size, bool))
+    run = SimpleNamespace(motor=angle, period_s=1e-3)
+    assert 200.0 in other_orders([run], [ripple], 1.0)
+
+
 def test_a_ripple_of_what_turns_slower_than_the_motor_is_found() -> None:
     t = np.arange(20_000) * 2e-3
     angle = 150.0 * np.sin(0.6 * t)  # rad: some 48 turns of the motor

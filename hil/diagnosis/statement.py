@@ -10,6 +10,7 @@ from hil.diagnosis.open_questions import cannot_show
 from hil.diagnosis.result import AT_FLOOR, MOMENT, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import listed, named, spoken, titles
+from hil.identification.coordinates import DELAY
 from hil.identification.least_squares import SIGMAS
 from hil.quantities import percent, quantity
 
@@ -98,7 +99,10 @@ def _of_axis(change: AxisChange, result: Result) -> str:
         for one in change.parameters
     )
     if result.verdict is Verdict.AXIS_CHANGED:
-        return f"The axis changed {where}: {told}. With values of each part no physics is missing."
+        delays = all(one.name == DELAY for one in change.parameters)
+        clocks = "The clocks of torque and position shifted (rows lost, or a clock that was set)"
+        what = clocks if delays else "The axis changed"
+        return f"{what} {where}: {told}. With values of each part no physics is missing."
     share = percent(1.0 - result.unexplained.share)
     return (
         f"No mechanism of the library explains the whole mismatch. Parameters that change {where} explain {share} of "

@@ -61,20 +61,15 @@ def changed(nominal: Fit, held_out: Dataset, moves: bool) -> Change | None:
 
 def _changed_within(whole: Fit) -> Change | None:
     """A change at a moment of a recording, or of its parts, that explains nearly all of a fit's mismatch; else None."""
-    runs, at = whole.data.runs, _moment(whole)
-    if at is None:
+    runs, fits = whole.data.runs, _before_and_after(whole, _moment(whole))
+    if not fits:
         return None
-    number, row = at
-    cut = runs[number]
-    settling = round(SETTLE_IN_MOTION_S / cut.period_s)
-    before, after = [*runs[:number]], [*runs[number + 1 :]]
-    if row > cut.evaluated.indices(cut.motor.size)[0] + settling:
-        before.append(cut.until(row))
-    if row + 2 * settling < cut.motor.size:
-        after.insert(0, replace(cut, lead_in=row + settling))
-    if not before or not after:
+    # the first moment takes the change of the parameters as small
+    at = _moment_between(whole, fits)
+    fits = _before_and_after(whole, at)
+    if not fits:
         return None
-    fits = [fit_nominal_parameters(whole.data.over(part)) for part in (before, after)]
+    cut, row = runs[at[0]], at[1]
     left = sum(fit.excess for fit in fits) / whole.excess if whole.excess > 0.0 else 0.0
     found = _differing(fits)
     if left > 1.0 - CRITERIA.change or not found:
@@ -82,6 +77,21 @@ def _changed_within(whole: Fit) -> Change | None:
     moment_s = float(cut.time_s[row])
     told = AxisChange(recording=whole_name(cut.name), moment_s=moment_s, parts=("before", "after"), parameters=found)
     return Change(told, runs, tuple(fits), left)
+
+
+def _before_and_after(whole: Fit, at: tuple[int, int] | None) -> list[Fit]:
+    """Fits of the nominal parameters to the rows before and after a row of a run; none without one of both."""
+    if at is None:
+        return []
+    (number, row), runs = at, whole.data.runs
+    cut = runs[number]
+    settling = round(SETTLE_IN_MOTION_S / cut.period_s)
+    before, after = [*runs[:number]], [*runs[number + 1 :]]
+    if row > cut.evaluated.indices(cut.motor.size)[0] + settling:
+        before.append(cut.until(row))
+    if row + 2 * settling < cut.motor.size:
+        after.insert(0, replace(cut, lead_in=row + settling))
+    return [fit_nominal_parameters(whole.data.over(part)) for part in (before, after)] if before and after else []
 
 
 def _each(data: Dataset, runs: Sequence[Measured]) -> list[Fit]:
@@ -111,22 +121,39 @@ def _moment(whole: Fit) -> tuple[int, int] | None:
     Two changes of the parameters, one for the rows before it and one for those after it, leave the smallest residuals
     there. Residuals are taken as linear in these changes.
     """
-    columns = whole.residuals.split(np.column_stack([whole.jacobian, whole.residuals.vector]))
-    products, rows = list[FloatArray](), list[tuple[int, int]]()
-    for number, run in enumerate(whole.data.runs):
-        own = [part for (of, _), part in zip(whole.residuals.parts, columns, strict=True) if of == number]
+    products, rows = _by_blocks(whole, np.column_stack([whole.jacobian, whole.residuals.vector]))
+    cuts = _cuts(rows)
+    if not cuts or not whole.jacobian.shape[1]:
+        return None
+    normal = np.cumsum(products, axis=0)
+    return rows[min(cuts, key=lambda cut: _left(normal[cut]) + _left(normal[-1] - normal[cut]))]
+
+
+def _moment_between(whole: Fit, fits: Sequence[Fit]) -> tuple[int, int]:
+    """Run and row before which the first of two fits, and from which the second, leaves least of all runs."""
+    parts = [replace(fit.estimator, data=whole.data).evaluate(fit.hypothesis).residuals.vector for fit in fits]
+    products, rows = _by_blocks(whole, np.column_stack(parts))
+    before, after = (np.cumsum([one[at, at] for one in products]) for at in (0, 1))
+    return rows[min(_cuts(rows), key=lambda cut: before[cut] - after[cut])]
+
+
+def _by_blocks(fit: Fit, columns: FloatArray) -> tuple[list[FloatArray], list[tuple[int, int]]]:
+    """Products (k, k) of columns (m, k) beside the residuals of a fit, by blocks of time; run and last row of each."""
+    split, products, rows = fit.residuals.split(columns), list[FloatArray](), list[tuple[int, int]]()
+    for number, run in enumerate(fit.data.runs):
+        own = [part for (of, _), part in zip(fit.residuals.parts, split, strict=True) if of == number]
         block = max(round(_BLOCK_S / run.period_s), 1)
         count = own[0].shape[0] // block
         table = np.concatenate([part[: count * block].reshape(count, block, -1) for part in own], axis=1)
         products += list(np.einsum("bij,bik->bjk", table, table))
         first = run.evaluated.indices(run.motor.size)[0]
         rows += [(number, min(first + (one + 1) * block, run.motor.size - 1)) for one in range(count)]
+    return products, rows
+
+
+def _cuts(rows: Sequence[tuple[int, int]]) -> range:
     margin = max(round(_SHORTEST * len(rows)), 1)
-    cuts = range(margin, len(rows) - margin)
-    if not cuts or not whole.jacobian.shape[1]:
-        return None
-    normal = np.cumsum(products, axis=0)
-    return rows[min(cuts, key=lambda cut: _left(normal[cut]) + _left(normal[-1] - normal[cut]))]
+    return range(margin, len(rows) - margin)
 
 
 def _left(normal: FloatArray) -> float:

@@ -1,5 +1,7 @@
 """What the bench has already, as a draft has it, of what recordings tell."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from hil.bench.bench_file import MechanismEntry
@@ -17,28 +19,35 @@ from hil.quantities import quantity, unit_of
 from hil.twin.library import BY_ID
 
 
-def in_bench(final: Fit, held_out: Dataset) -> str:
+def in_bench(final: Fit, held_out: Dataset, changes: Collection[str] = ()) -> str:
     """Springs, a lateness of the torque of more than a row, and mechanisms of the bench that are above their errors and
-    matter; empty without."""
+    matter; empty without. Parameters that change are told elsewhere.
+    """
     hypothesis = final.hypothesis
     # a fit at the values of the bench file has no derivatives, and these values no errors
     errors = dict(zip(hypothesis.nominal, standard_errors(final) if final.jacobian.size else (), strict=False))
     axis, told = final.bench.axis, list[str]()
     for name in axis.SPRINGS:
-        if unit_of(name) == "1":  # damping, or a factor on a stiffness, is no size of a spring
+        if unit_of(name) == "1" or name in changes:  # damping, or a factor on a stiffness, is no size of a spring
             continue
         if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
             told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
     delay_s = hypothesis.resolved.bench.torque_delay_s
     acts_s = (delay_s or 0.0) + 0.5 * final.bench.period_s  # the twin holds each value for a row
     error_s = SIGMAS * errors.get(DELAY, 0.0)
-    if delay_s and abs(acts_s) > max(error_s, final.bench.period_s) and DELAY not in final.at_bound:
+    if (
+        delay_s
+        and DELAY not in changes
+        and abs(acts_s) > max(error_s, final.bench.period_s)
+        and DELAY not in final.at_bound
+    ):
         told.append(f"The {delay_in_words(acts_s)}.")
     for kept in hypothesis.kept:
         entry, mechanism = kept.active(), BY_ID[kept.effect]
         known = [errors.get(f"{entry.effect}.{one.name}", 0.0) for one in mechanism.parameters]
         clear = abs(entry.values[mechanism.strength]) > SIGMAS * known[mechanism.strength]
-        if clear and matters(final, kept, held_out if held_out.runs else final.data):
+        changes_too = any(f"{entry.effect}.{one.name}" in changes for one in mechanism.parameters)
+        if clear and not changes_too and matters(final, kept, held_out if held_out.runs else final.data):
             term = Term(entry.effect, entry.variant, entry.values)
             told.append(sentence(term, final.bench, TermErrors(known, known[mechanism.strength])))
     where = "The bench file has already, here refitted" if final.jacobian.size else "The bench file has already"

@@ -74,3 +74,19 @@ def test_a_weight_that_the_bench_has_not_may_change_at_a_moment(tmp_path: Path) 
     assert "already" not in found.result.statement
     (panel, *_) = found.plot("change").axes
     assert abs(float(np.median(panel.lines[0].get_ydata()))) < 0.5
+
+
+def test_rows_that_a_logger_lost_are_a_shift_of_the_clocks(tmp_path: Path) -> None:
+    """The torque is early by 9 rows from a moment on: nothing of the axis changed."""
+    columns = axis(ROWS + 9)
+    torque = columns["torque"] + np.random.default_rng(5).normal(0.0, 0.1 * NOISE_N_M, ROWS + 9)
+    columns = {name: values[:ROWS] for name, values in columns.items()}
+    columns["torque"] = np.concatenate([torque[:AT], torque[AT + 9 :]])
+    path = write(tmp_path / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
+    result = explain([path], tmp_path / "out").diagnosis.result
+    assert result.verdict == "axis_changed"
+    assert result.change is not None
+    assert result.statement.startswith("The clocks of torque and position shifted (rows lost, or a clock that was set)")
+    (delay,) = result.change.parameters
+    assert delay.values[1].value - delay.values[0].value == pytest.approx(9e-3, abs=5e-4)
+    assert result.change.moment_s == pytest.approx(1e-3 * AT, abs=0.3)

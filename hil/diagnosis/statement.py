@@ -130,8 +130,10 @@ def _changed(name: str, one: Correction) -> str:
 def _left(result: Result) -> str:
     """What is left above the noise as a sentence, and what it depends on; empty if nothing is."""
     told = result.unexplained.description
-    above = "" if told == AT_FLOOR else f" Not explained: {told[:1].lower()}{told[1:]}"
-    return f"{above}{_depends(result)}"
+    if told == AT_FLOOR:
+        return _depends(result)
+    noise = told.count(NO_STRUCTURE) == told.count(" times")
+    return f" {_wandering(told) if noise else f'Not explained: {told[:1].lower()}{told[1:]}'}{_depends(result)}"
 
 
 def _unexplained(result: Result) -> str:

@@ -129,7 +129,7 @@ class ChannelEntries:
                 draft.lead_m, draft.lead_how = told.value, f"header of the file: {told.text}"
             else:
                 draft.lead_m = ROTARY_LEAD_M
-                draft.lead_how = "a rotary axis: one metre of the load is one radian. Of a screw write its lead"
+                draft.lead_how = "an axis that turns: leave it. Of a screw, belt or rack write the travel per turn"
                 keys |= {} if counted or roles.table else self._gear(name)
         keys |= {"sign": -1} if self.motor_sign < 0 else {}
         self._add(channel, name, "steps of the motor" if self.labels[name].command else "the motor's encoder", keys)

@@ -22,6 +22,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Block
 
 # Channel of the twin -> block whose output it is, and the parts of the axis to inspect
 BLOCKS = {
@@ -86,7 +87,8 @@ def shown_in(fit: Fit, held_out: Dataset) -> Fit:
 def mismatch_energies(fit: Fit, final: Fit) -> list[Energy]:
     """Energy of the effect of the terms of `final` by row, else that of the residuals of `fit`."""
     if final.terms:
-        return energies(without_terms(final.hypothesis), fit.data, final.hypothesis)
+        of_sensors = all(BY_ID[term.effect].block is Block.SENSOR for term in final.terms)
+        return energies(without_terms(final.hypothesis), fit.data, final.hypothesis, of_sensors)
     return energies(fit.hypothesis, fit.data)
 
 

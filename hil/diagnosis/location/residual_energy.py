@@ -23,15 +23,21 @@ class Energy:
     parts: dict[str, FloatArray]
 
 
-def energies(hypothesis: Hypothesis, data: Dataset, reference: Hypothesis | None = None) -> list[Energy]:
-    """Energy of the rows of each run under a hypothesis; with `reference`, that of the difference of both."""
+def energies(
+    hypothesis: Hypothesis, data: Dataset, reference: Hypothesis | None = None, of_place: bool = False
+) -> list[Energy]:
+    """Energy of the rows of each run under a hypothesis; with `reference`, that of the difference of both.
+
+    `of_place`: an error of the table is that of its place, as of an encoder; else what remains of an earlier cause.
+    """
     result = []
     for index, run in enumerate(data.runs):
         parts = hypothesis.residuals(data).over_noise(index)
         if reference is not None:
             other = reference.residuals(data).over_noise(index)
             parts = {name: values - other[name] for name, values in parts.items()}
-        rows = np.sum([_arising(name, values, run) ** 2 for name, values in parts.items()], axis=0)
+        arising = [values if of_place else _arising(name, values, run) for name, values in parts.items()]
+        rows = np.sum([values**2 for values in arising], axis=0)
         if reference is None:
             rows = rows - len(parts)
         rows[: run.evaluated.start] = 0.0

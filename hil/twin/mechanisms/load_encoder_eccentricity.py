@@ -21,7 +21,7 @@ def _eccentric_reading(value: float, at: Moment, parameters: Row, memory: Row) -
 MECHANISM = Mechanism(
     id="load_encoder_eccentricity",
     block=Block.SENSOR,
-    element="load encoder",
+    element="load encoder, or the last wheel of the gear",
     equation="q_read = q + A sin(q + phi), A = eccentricity / graduation radius",
     source="Heidenhain, Angle Encoders without Integral Bearing (catalogue), eccentricity of the graduation",
     parameters=(
@@ -30,7 +30,8 @@ MECHANISM = Mechanism(
     ),
     variants=(Variant(Stage.TABLE_READING, _eccentric_reading),),
     text=Text(
-        "The load encoder sits off centre: it errs by {amplitude_rad} once per revolution of the load.",
+        "The load encoder, or the wheel that turns the load, sits off centre: the encoders differ by {amplitude_rad} "
+        "once per revolution of the load.",
         Picture.LOAD_READING,
     ),
     search=SearchHints(lambda s: [(1e-5, 0.0)], lambda a: (2e-4, 0.0), needs_table=True),

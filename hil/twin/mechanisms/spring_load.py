@@ -59,7 +59,11 @@ MECHANISM = Mechanism(
         Parameter("rest_position_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE),
     ),
     variants=(Variant(Stage.TABLE_FORCE, _pull_to_rest),),
-    text=Text("A spring of {stiffness_n_m} pulls the table towards {rest_position_m}.", Picture.FORCE_OVER_TRAVEL),
+    text=Text(
+        "A force that grows by {stiffness_n_m} pulls the table back, as of a spring, a chain or a hose; its rest is at "
+        "{rest_position_m}.",
+        Picture.FORCE_OVER_TRAVEL,
+    ),
     search=SearchHints(_starts, lambda a: (0.5 * a.friction / a.ratio, 0.0)),
     can_be=_valid,
     is_another=_is_weight,

@@ -7,7 +7,7 @@ from typing import Any
 from example_result import EXAMPLE
 
 from hil.diagnosis.ledger import EXPLAINS
-from hil.diagnosis.result import AT_FLOOR, Result
+from hil.diagnosis.result import AT_FLOOR, NO_STRUCTURE, Result
 from hil.diagnosis.statement import statement
 from hil.twin.library import LIBRARY
 
@@ -55,6 +55,17 @@ def test_without_a_structure_the_torque_tells_why_it_is_not_explained() -> None:
     told = said(verdict="unexplained", torque_left=TORQUE)
     assert told.startswith("No named physics is missing; every channel is within its noise, and the twin leaves 5.87 %")
     assert said(verdict="unexplained").endswith("every channel is within its noise.")
+
+
+def test_noise_that_wanders_beside_a_name_is_not_called_unexplained() -> None:
+    left = f"Residuals above the noise (rms): motor position 3.16 times in 3 of 17 recordings or parts {NO_STRUCTURE}."
+    wanders = said(missing=EXAMPLE["missing"], unexplained={"description": left, "share": 0.0})
+    assert f"{left.removesuffix('.')}: noise that wanders, or a random disturbance." in wanders
+    assert "Not explained" not in wanders
+    both = left.replace("motor position", "table position 2.00 times, motor position")
+    assert "Not explained: residuals" in said(
+        missing=EXAMPLE["missing"], unexplained={"description": both, "share": 0.3}
+    )
 
 
 def test_residuals_above_the_noise_are_a_mismatch() -> None:

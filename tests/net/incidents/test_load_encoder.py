@@ -33,7 +33,7 @@ def test_an_eccentric_encoder_of_the_load_is_found() -> None:
     recording = hil.simulate(truth, plan(profile, truth.period_s), seed=3)
     result = hil.diagnose(recording, truth.model_copy(update={"simulation": None})).result
     (finding,) = result.missing
-    assert "The load encoder sits off centre" in result.statement
+    assert "The load encoder, or the wheel that turns the load, sits off centre" in result.statement
     assert result.location.period_m == pytest.approx(2.0 * math.pi)  # not a turn of the motor
     assert finding.effect == MECHANISM.id
     assert finding.parameters["amplitude_rad"].value == pytest.approx(amplitude_rad, rel=0.02)

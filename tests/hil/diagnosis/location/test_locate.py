@@ -9,7 +9,7 @@ import pytest
 from diagnosis_runs import bench, evaluated, recorded, rows_of
 from numpy.typing import NDArray
 
-from hil.diagnosis.location.locate import _range, locate, phase_shares, phases, windows
+from hil.diagnosis.location.locate import _range, locate, mismatch_energies, phase_shares, phases, windows
 from hil.diagnosis.location.periodicity import Lock, lock
 from hil.diagnosis.location.residual_energy import Energy, energies
 from hil.diagnosis.result import Location, PhaseKind
@@ -80,6 +80,16 @@ def test_at_a_single_speed_nothing_is_claimed() -> None:
     one = rows_of(run, rows)
     seen = [Energy(one, np.zeros(one.motor.size), {"motor": np.sin(one.motor * 3.0)})]
     assert lock(seen, "motor", OWNER, ()).order_per_rev is None
+
+
+def test_the_error_of_an_encoder_is_where_it_stands_at_every_speed() -> None:
+    term = Term("scale_interpolation_error", 0, (2e-6, 1e-3, 0.3))
+    run = take(recorded(OWNER, term), OWNER)
+    without = evaluated(Hypothesis(OWNER), [run])
+    (seen,) = mismatch_energies(without, evaluated(Hypothesis(OWNER, (term,)), without.data))
+    speed = np.abs(run.velocity_command_m_s)
+    slow, fast = ((speed > low) & (speed < high) for low, high in ((0.01, 0.05), (0.15, 0.3)))
+    assert np.mean(seen.rows[fast]) == pytest.approx(np.mean(seen.rows[slow]), rel=0.3)
 
 
 def test_a_force_in_a_window_is_found_in_its_window() -> None:

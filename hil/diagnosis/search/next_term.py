@@ -89,9 +89,10 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
     if best is None and additions:  # neither of two that belong together may stand without the other
         additions = ordered([*additions, *pairs(min(additions, key=lambda one: one.fit.cost))])
         best = first_standing(additions)
-    # a refit that ends at its bounds may have been led astray by what is missing; a term that explains all was not
+    # a refit that ends at its bounds may have been led astray by what is missing; with a term that leaves nothing it
+    # was not
     stuck = not base.terms and bool(set(base.at_bound).intersection(base.hypothesis.nominal))
-    astray = best is None or (stuck and not best.fit.at_floor)
+    astray = best is None or (stuck and best.fit.excess > CRITERIA.nothing * best.fit.rows)
     if astray and not base.at_floor and search.unfinished:
         step("searching again beside the parameters of the bench file")
         additions = ordered([*additions, *possible(from_bench_file(base))])

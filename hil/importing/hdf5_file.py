@@ -19,7 +19,8 @@ _MISSING = ("_FillValue", "missing_value")
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """Datasets and fields of tables by name, texts, and attributes of their groups and of the root.
 
-    Units, factors and missing values are those of the attributes of a dataset. Links to other files are not followed.
+    Units, factors and missing values are those of the attributes of a dataset. An attribute with different values in
+    several groups is left out. Links to other files are not followed.
     Raises InputError: damaged, too many values, or h5py is not installed.
     """
     library = optional_library(path, "h5py", "h5py", "exchange")
@@ -35,10 +36,12 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
                 groups.setdefault(folder, []).append(one)
         read = [group for name, members in groups.items() for group in _groups(library, name, members)]
         scalars = (str, int, float, np.integer, np.floating)
-        owners = [file, *(file[name] for name in groups if isinstance(file[name], library.Group))]
-        texts = {
-            name: np.array(value) for one in owners for name, value in one.attrs.items() if isinstance(value, scalars)
-        }
+        told = dict[str, set[Any]]()
+        for one in [file, *(file[name] for name in groups if isinstance(file[name], library.Group))]:
+            for name, value in one.attrs.items():
+                if isinstance(value, scalars):
+                    told.setdefault(name, set()).add(value)
+        texts = {name: np.array(*values) for name, values in told.items() if len(values) == 1}
     arrays, units = one_length(path, read)
     return texts | arrays, units
 

@@ -18,6 +18,7 @@ from hil.files import input_file
 from hil.importing.by_map import import_recording
 from hil.importing.channel_groups import Group, one_length
 from hil.importing.draft_map import draft_map
+from hil.importing.hdf5_file import load_hdf5
 from hil.importing.map_text import map_text
 from hil.importing.variables import load_variables
 from hil.recording.recording import Recording
@@ -131,6 +132,19 @@ def test_the_rate_is_an_attribute_of_the_group_or_of_the_file(at: str, tmp_path:
             group.create_dataset(name, data=values).attrs["unit"] = unit
         file[at].attrs["sample_rate_Hz"] = 1000.0
     assert imported(path).period_s == pytest.approx(1e-3)
+
+
+def test_an_attribute_that_groups_give_with_different_values_is_none(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        for number, name in enumerate(("angle", "torque")):
+            group = file.create_group(name)
+            group.create_dataset(name, data=ANGLE)
+            group.attrs.update({"sample_rate_Hz": 1000.0 * (1 + number), "device": "a"})
+    texts, _ = load_hdf5(path)
+    assert "sample_rate_Hz" not in texts
+    assert str(texts["device"]) == "a"
 
 
 @pytest.mark.parametrize("library", [pytest.param("h5py", marks=needs(".h5"))])

@@ -61,12 +61,13 @@ def changed(nominal: Fit, held_out: Dataset, moves: bool) -> Change | None:
 
 def _changed_within(whole: Fit) -> Change | None:
     """A change at a moment of a recording, or of its parts, that explains nearly all of a fit's mismatch; else None."""
-    runs, fits = whole.data.runs, _before_and_after(whole, _moment(whole))
+    runs, first = whole.data.runs, _moment(whole)
+    fits = _before_and_after(whole, first)
     if not fits:
         return None
     # the first moment takes the change of the parameters as small
     at = _moment_between(whole, fits)
-    fits = _before_and_after(whole, at)
+    fits = fits if at == first else _before_and_after(whole, at)
     if not fits:
         return None
     cut, row = runs[at[0]], at[1]

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
     from hil.diagnosis.diagnosis import Diagnosis
     from hil.drafting.drafted_bench import DraftedBench
+    from hil.importing.map_draft import MapDraft
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
 _DRAFTED_WITH = "# Drafted with: "  # options, at the end of a map
@@ -53,6 +54,16 @@ class Basis:
     bench: Bench
     draft: DraftedBench | None
     assumed: tuple[str, ...]
+
+    @property
+    def unsized(self) -> dict[str, list[str]]:
+        """Channels of each map whose size nothing tells, so that their values are multiples."""
+        found: dict[str, list[str]] = {}
+        for note, mark, _ in (one.partition(f": {COUNT_AS}") for one in self.assumed):
+            path, _, channel = note.rpartition(": ")
+            if mark:
+                found.setdefault(path, []).append(channel)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +88,6 @@ class Explanation:
     def assumed(self) -> tuple[str, ...]:
         """What was assumed of recordings and bench, with the file in which it can be corrected."""
         return self.basis.assumed
-
-    @property
-    def unsized(self) -> dict[str, list[str]]:
-        """Channels of each map whose size nothing tells, so that their values are multiples."""
-        found: dict[str, list[str]] = {}
-        for note, mark, _ in (one.partition(f": {COUNT_AS}") for one in self.assumed):
-            path, _, channel = note.rpartition(": ")
-            if mark:
-                found.setdefault(path, []).append(channel)
-        return found
 
     @property
     def report(self) -> Path:
@@ -207,19 +208,23 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
     options = [*(["--rate", f"{rate_hz:g}"] if rate_hz else []), *(["--axis", axis] if axis else [])]
     mark = f"{_DRAFTED_WITH}{shlex.join(options)}\n"
     command = shlex.join(["hil", "explain", str(source), "--out", str(path.parent), *options])
-    notes = [f"{path}: used as it is"]
-    if not is_file(path):
+    if is_file(path):
+        text = path.read_text(encoding="utf-8")
+        draft = _drafted(source, rate_hz, axis, text)
+    else:
         try:
             draft = draft_map(source, rate_hz, axis)
         except RateNeeded as error:
             raise RateNeeded(error.problem, command) from None
         take_own_units(draft)
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(path, map_text(draft) + (mark if options else ""))
+        text = map_text(draft) + (mark if options else "")
+        write_text(path, text)
+    notes = [f"{path}: used as it is"]
+    if draft is not None:
         notes = [f"{path}: which column is what, units and signs; drafted from the file"]
         notes += [f"{path}: {note}" for note in draft.unsure]
         notes += [f"{path}: column {name!r} is not used: {why}" for name, why in draft.left_out.items()]
-    text = path.read_text(encoding="utf-8")
     if options and mark not in text:
         raise InputError(
             f"{path}: it is there already and was not drafted with {shlex.join(options)}; edit it and leave the option "
@@ -229,6 +234,15 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
         told = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
         raise InputError("\n".join([told, *(f"{path}:{line}: {question}" for line, question in asked)]))
     return import_recording(source, path), notes
+
+
+def _drafted(source: Path, rate_hz: float | None, axis: str | None, text: str) -> MapDraft | None:
+    """The draft of which a map is the text, so that what it assumed holds; None if the map was edited."""
+    with suppress(InputError):
+        draft = draft_map(source, rate_hz, axis)
+        take_own_units(draft)
+        return draft if text.startswith(map_text(draft)) else None
+    return None
 
 
 def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedBench | None, list[str]]:

@@ -74,11 +74,8 @@ def explain(
         )
     for warning in (one for one in found.assumed if OUTDATED in one):
         out.print(f"{warning}.\n")
-    for path, channels in found.unsized.items():
-        out.print(
-            f"Nothing tells the size of {', '.join(channels)}: values are multiples of the true ones, and a named "
-            f"effect can be wrong. Write the size into {path} and run the command again.\n"
-        )
+    for line in _unsized(found.basis):
+        out.print(f"{line}\n")
     out.print(page_line(found.report))
     if show and found.report.exists():
         import webbrowser
@@ -98,3 +95,13 @@ def _first_answer(basis: "Basis") -> None:
     err.print("Assumed:")
     for note in basis.assumed:
         err.print(f"  - {note}")
+    for line in _unsized(basis):  # before the minutes of a search
+        err.print(line)
+
+
+def _unsized(basis: "Basis") -> list[str]:
+    return [
+        f"Nothing tells the size of {', '.join(channels)}: values are multiples of the true ones, and a named "
+        f"effect can be wrong. Write the size into {path} and run the command again."
+        for path, channels in basis.unsized.items()
+    ]

@@ -17,6 +17,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, accepted, examine
 from hil.diagnosis.search.addition import removed
 from hil.diagnosis.search.events import beside_loads, revised
+from hil.diagnosis.search.exchange import exchanged
 from hil.diagnosis.search.facts import axis_facts
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.next_term import Additions, SearchRound, first_standing, next_term
@@ -126,6 +127,14 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         added, more = _grown(additions, round_, nominal, tried)
         considered += more
         if added is None:
+            other = exchanged(base, rivals, nominal, given)
+            rivals, considered = other.rivals, [*considered, *other.considered]
+            if effects(other.fit.terms) not in tried:
+                step("searching on with another mechanism in the place of one")
+                base, needed, pruned = _pruned(other.fit, nominal)
+                considered += pruned
+                tried.append(effects(other.fit.terms))
+                continue
             factors = unexplained_channels(base)
             if not factors:
                 break

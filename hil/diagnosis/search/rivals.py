@@ -24,7 +24,7 @@ from hil.identification.inference import Filter, bic_gain, bic_margin, refuted, 
 from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
-_NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
+NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
 ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
 
 
@@ -91,7 +91,7 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     started = best if fit is best.fit else search.addition(fit)
     converged = _ended(started, search)
     best = converged if converged.claimable else started
-    others = [_ended(one, search) if one.fit.cost < _NEAR * best.fit.cost else one for one in begun]
+    others = [_ended(one, search) if one.fit.cost < NEAR * best.fit.cost else one for one in begun]
     order = ordered([best, *(one for one in others if one.possible)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
     standing = [one for one in order if one is not best and one.claimable and not objection(one, best)]

@@ -73,7 +73,7 @@ def test_a_corrected_bench_is_taken_up_again(explained: tuple[Path, str, str]) -
         assert ran.returncode == 0, ran.stderr
         assert bench.read_text() == mended
         assert "bench.yaml: used as it is" in ran.stderr
-        assert "axis-map.yaml: used as it is" in ran.stderr
+        assert "axis-map.yaml: which column is what" in ran.stderr  # nobody edited it: what it assumed still holds
         found = json.loads((folder / FOLDER / "report" / "diagnosis.json").read_text())
         coulomb = found["parameter_corrections"]["coulomb_torque_n_m"]
         assert coulomb["nominal"] == 0.5
@@ -108,8 +108,19 @@ def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path:
     assert ran.returncode == 0, ran.stderr
     assert "torque_n_m: its numbers count as N m" in ran.stderr
     assert printed(ran.stdout, "inertia_kg_m2") == pytest.approx(10.0 * INERTIA_KG_M2, rel=0.02)
-    assert "Nothing tells the size of torque_n_m: values are multiples" in " ".join(ran.stdout.split())
+    told = "Nothing tells the size of torque_n_m: values are multiples"
+    assert told in " ".join(ran.stdout.split())
+    assert told in " ".join(ran.stderr.split())  # before the search
     assert "its numbers count as N m" in (tmp_path / FOLDER / "report" / "report.html").read_text()
+
+    again = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
+    assert told in " ".join(again.stdout.split())
+
+    path = tmp_path / FOLDER / "axis-map.yaml"
+    path.write_text(path.read_text().replace("about:", "about: edited"))
+    edited = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
+    assert "axis-map.yaml: used as it is" in edited.stderr
+    assert "Nothing tells the size" not in edited.stderr + edited.stdout
 
 
 def test_a_file_that_cannot_be_read_leaves_no_folder(tmp_path: Path) -> None:

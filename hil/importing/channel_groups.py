@@ -1,7 +1,11 @@
-"""Groups of channels, each with a clock of its own, as columns of one length: what files of several rates have."""
+"""Groups of channels, each with a clock of its own, as columns of one length: what files of several rates have.
 
+Groups of a file that are runs of one axis, one after the other, are one group: the same channels under names of runs.
+"""
+
+import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +14,11 @@ import numpy as np
 from hil.files.input_file import check_values
 
 CLOCK = "time"  # channel of stamps that have no name in the file
+_RUN = re.compile(
+    r"(?:run|test|trial|scan|take|shot|rec\w*|meas\w*|mess\w*|versuch|fahrt|lauf|essai|prueba)[ _.-]*\d+", re.I
+)
+_APART = 100  # rows between two runs, more than a gap that is interpolated
+_FEWEST = 2  # channels: position and torque
 
 
 class Group(NamedTuple):
@@ -29,7 +38,7 @@ def one_length(path: Path, groups: Iterable[Group]) -> tuple[dict[str, Any], dic
 
     A name that several groups have becomes GROUP.NAME. Raises InputError for too many values.
     """
-    groups = [group for group in groups if len(group.channels) > group.has_clock]
+    groups = _runs_joined([group for group in groups if len(group.channels) > group.has_clock])
     times = Counter(name for group in groups for name in group.channels)
     clocked = [group for group in groups if group.has_clock]
     rows = max((len(values) for group in clocked for values in group.channels.values()), default=0)
@@ -47,6 +56,42 @@ def one_length(path: Path, groups: Iterable[Group]) -> tuple[dict[str, Any], dic
             if unit := group.units.get(name):
                 units[unique] = unit
     return arrays, units
+
+
+def _runs_joined(groups: Sequence[Group]) -> list[Group]:
+    """The groups, those that are runs with the same channels as one, with a gap between each two of them.
+
+    Stamps that begin anew go on after the gap; without stamps it is rows without values.
+    """
+    runs = [one for one in groups if _RUN.fullmatch(one.name.rpartition(".")[2]) and _is_table(one)]
+    alike = [one for one in runs if set(one.channels) == set(runs[0].channels) and one.has_clock == runs[0].has_clock]
+    if len(alike) < 2 or len(alike) < len(runs):
+        return list(groups)
+    first = alike[0]
+    joined = {name: np.asarray(first.channels[name], dtype=np.float64) for name in first.channels}
+    clock = next(iter(joined)) if first.has_clock else ""
+    for run in alike[1:]:
+        gap = 0 if clock else _APART
+        for name, before in joined.items():
+            values = np.asarray(run.channels[name], dtype=np.float64)
+            if name == clock:
+                values = _after(before, values)
+            joined[name] = np.concatenate([before, np.full((gap, *before.shape[1:]), np.nan), values])
+    whole = Group(first.name, joined, first.units, first.has_clock)
+    return [whole if one is first else one for one in groups if one is first or one not in alike]
+
+
+def _is_table(group: Group) -> bool:
+    """True for numbers of one length in several channels."""
+    values = [np.asarray(one) for one in group.channels.values()]
+    numbers = all(one.dtype.kind in "fiub" and one.ndim for one in values)
+    return numbers and len(values) >= _FEWEST + group.has_clock and len({len(one) for one in values}) == 1
+
+
+def _after(before: Any, stamps: Any) -> Any:
+    """Stamps (n,) as they are where they follow those before, else moved behind them and a gap."""
+    step = float(np.median(np.diff(before))) if before.size > 1 else 1.0
+    return stamps if stamps[0] > before[-1] else stamps - stamps[0] + before[-1] + _APART * step
 
 
 def _ended(values: Any, rows: int) -> Any:

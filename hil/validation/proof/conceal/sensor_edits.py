@@ -17,7 +17,7 @@ from hil.twin.mechanisms import (
 )
 from hil.validation.proof.conceal.edit import Edit, later
 from hil.validation.proof.conceal.half import EditedChannel, Half, rows_of
-from hil.validation.proof.conceal.torque_edits import Drawn, Rng
+from hil.validation.proof.conceal.torque_edits import MOMENTS, Drawn, Rng
 
 _LATEST_S = 8e-3  # of a channel
 _SCALE = 2e-3  # largest relative error of a scale
@@ -60,6 +60,20 @@ def _torque_late(half: Half, rng: Rng) -> Edit | None:
 
     mechanism = channel_time_skew.MECHANISM
     return Edit(EditedChannel.CURRENT, delayed, _LATEST_S, mechanism, variant=1, told=(0,), adds=True, whole=period_s)
+
+
+def _clock_set(half: Half, rng: Rng) -> Edit | None:
+    """The torque is later from a moment on, as where the logger of one channel lost rows."""
+    torque, period_s = half.torque, half.recording.period_s
+    if half.law_known:
+        return None
+    moment_s = float(half.time_s[-1] * rng.uniform(*MOMENTS))
+    after = half.time_s >= moment_s
+
+    def delayed(late_s: float) -> FloatArray:
+        return np.where(after, later(torque, late_s / period_s), torque)
+
+    return Edit(EditedChannel.TORQUE, delayed, _LATEST_S, signed=True, whole=period_s, moment_s=moment_s)
 
 
 def _scaled(half: Half, rng: Rng) -> Edit | None:
@@ -158,6 +172,7 @@ SENSOR_EDITS: Mapping[str, Drawn] = {
     "second encoder late": _table_late,
     "motor encoder late": _motor_late,
     "torque late": _torque_late,
+    "torque later from a moment on": _clock_set,
     "scale of the second encoder": _scaled,
     "scale over time": _growing,
     "second encoder within a short period": _interpolated,

@@ -34,7 +34,7 @@ _ORDERS = (4, 6, 8, 12, 18, 24, 36)  # of motors with 2 to 6 pole pairs
 _HIGHEST = 2.0  # of the Coulomb friction: in a zone
 _STEEPEST_M = 1e-3  # flank of a zone
 _COMPRESSED = 0.5  # of the largest torque: level above which the measured torque is too small
-_MOMENTS = (0.25, 0.75)  # shares of the half between which a change lies
+MOMENTS = (0.25, 0.75)  # shares of the half between which a change lies
 _SATURATED = 0.25  # of the largest torque: torque per ampere that is lost there
 
 
@@ -182,7 +182,7 @@ def _ramp(half: Half, rng: Rng) -> Edit:
 
 
 def _from_a_moment(half: Half, rng: Rng, shape: FloatArray) -> Edit:
-    moment_s = float(half.time_s[-1] * rng.uniform(*_MOMENTS))
+    moment_s = float(half.time_s[-1] * rng.uniform(*MOMENTS))
     return _added(half, shape * (half.time_s >= moment_s), None, signed=True, moment_s=moment_s)
 
 

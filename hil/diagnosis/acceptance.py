@@ -120,8 +120,9 @@ def paying(channels: Mapping[str, Harm], c: Criteria = CRITERIA) -> set[str]:
 
 
 def _not_behind(of: RivalFit, c: Criteria) -> Answer:
-    stands = not (of.evidence >= c.tied and (of.by_shape or of.more >= c.alike))
-    return stands, {"against": of.evidence, "more": of.more}
+    stands = not (of.evidence >= c.tied and of.more >= (c.discrepancy if of.by_shape else c.alike))
+    unit = f"{of.more:.2%} of the torque" if of.by_shape else f"{of.more:.3g} noise² per row"
+    return stands, {"against": of.evidence, "more": f", {unit} more" if math.isfinite(of.more) else ""}
 
 
 def _no_objection(of: RivalFit, c: Criteria) -> Answer:
@@ -246,8 +247,8 @@ COMPARED: tuple[Rule[RivalFit], ...] = (
     # a rival is refuted by very strong evidence and, above the noise, by more than the model discrepancy
     Rule(
         "beside the named one",
-        "the recordings do not separate them: evidence against it {against:.0f}, {more:.3g} noise² per row more",
-        "the named one explains more: evidence against it {against:.0f}, {more:.3g} noise² per row more",
+        "the recordings do not separate them: evidence against it {against:.0f}{more}",
+        "the named one explains more: evidence against it {against:.0f}{more}",
         _not_behind,
     ),
     # the conditions of a term

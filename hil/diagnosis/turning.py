@@ -19,6 +19,7 @@ _WORDS = {
     "ball screw": "gear",
     "screw grows": "ratio of the encoders grows",
     "of its length": "of its value",
+    "a length": "an angle",
     "lead": "transmission",
     "table": "load",
     "Table": "Load",

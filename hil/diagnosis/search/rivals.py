@@ -34,7 +34,8 @@ class RivalFit:
 
     `reduced` is its mean squared weighted residual, `more` its energy per row in units of noise^2 less that of the
     named explanation, whose mean square is `named`; `by_shape`: the evidence is that of the shapes below the noise, of
-    which the energy says nothing. `objection` is why it cannot be the cause, `behind` why the other
+    which the energy says nothing: there `more` is the torque that it misses beyond that of the named one, over its
+    deviation. `objection` is why it cannot be the cause, `behind` why the other
     is named though the evidence favours this one. The fit itself is not kept: its residuals and derivatives grow with
     the recordings.
     """
@@ -55,9 +56,8 @@ class RivalFit:
 
     def beside(self, named: RivalFit) -> RivalFit:
         """The same beside one of the other explanations, that is named now."""
-        return replace(
-            self, evidence=self.evidence - named.evidence, more=self.more - named.more, named=named.reduced, behind=""
-        )
+        more = max(self.more**2 - named.more**2, 0.0) ** 0.5 if self.by_shape else self.more - named.more
+        return replace(self, evidence=self.evidence - named.evidence, more=more, named=named.reduced, behind="")
 
     @property
     def ledger(self) -> Ledger:
@@ -154,7 +154,17 @@ def _parts(one: Addition) -> int:
 
 
 def _more(one: Addition, named: Addition) -> float:
-    return (one.fit.cost - named.fit.cost) / named.fit.rows
+    """Energy per row beyond that of the named one; below the noise the torque that it misses more (rms)."""
+    if not _by_shape(one, named):
+        return (one.fit.cost - named.fit.cost) / named.fit.rows
+    return more_torque(one.torque, named.torque)
+
+
+def more_torque(one: tuple[float, float] | None, other: tuple[float, float] | None) -> float:
+    """Torque (rms) that the first of two twins misses beyond the other; infinite where it says nothing of one."""
+    if one is None or other is None or not np.isfinite(one[0]):
+        return np.inf
+    return float(max(one[0] ** 2 - other[0] ** 2, 0.0) ** 0.5)
 
 
 def _by_shape(one: Addition, named: Addition) -> bool:
@@ -170,7 +180,9 @@ def _evidence(named: Addition, one: Addition, margin: Callable[[Fit, Fit], float
 
 
 def _refuted(evidence: float, one: Addition, named: Addition) -> bool:
-    return evidence >= CRITERIA.tied if _by_shape(one, named) else refuted(evidence, _more(one, named))
+    if _by_shape(one, named):
+        return evidence >= CRITERIA.tied and _more(one, named) >= CRITERIA.discrepancy
+    return refuted(evidence, _more(one, named))
 
 
 def _compared(one: Addition, named: Addition, filters: Sequence[Filter]) -> RivalFit:

@@ -20,7 +20,7 @@ from hil.diagnosis.ledger import Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition, Harm, harm, torque_of
 from hil.diagnosis.search.force_windows import strength_told
 from hil.diagnosis.search.forward_selection import claimed
-from hil.diagnosis.search.rivals import ENDED, RivalFit
+from hil.diagnosis.search.rivals import ENDED, RivalFit, more_torque
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.diagnosis.verdict.strength import strength_over_error
 from hil.identification.dataset import Dataset
@@ -32,6 +32,7 @@ from hil.identification.terms import Key, Term, compatible, free_slot
 
 Rivals = Mapping[Key, Sequence[RivalFit]]
 
+_PREDICTS_LESS = "with it the torque of held-out motion is predicted worse"
 _LEAST = 1e-12  # of the energy of the noise: a channel that the twin was given is left without a residual
 
 
@@ -95,7 +96,7 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals |
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first.
 
     The strongest rival that the training recordings do not tell from a dropped term takes its place, and is tested in
-    turn.
+    turn. So does one that predicts the torque of held-out motion better.
     """
     dropped: list[Ablation] = []
     known = dict(rivals or {})
@@ -104,7 +105,11 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals |
         ablations = _ablate(given, nominal, final, held_out)
         harmful = [ablation for ablation in ablations if ablation.refuted]
         if not harmful:
-            return CrossValidation(final, tuple(ablations), tuple(dropped), known)
+            better = _better_equal(final, ablations, known, held_out)
+            if better is None:
+                return CrossValidation(final, tuple(ablations), tuple(dropped), known)
+            final, known = better
+            continue
         worst = min(harmful, key=lambda ablation: ablation.gain or 0.0)
         dropped.append(worst)
         fit, rest = final, worst.without
@@ -115,6 +120,29 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals |
                 final = other
                 known[final.terms[-1].key] = [one.beside(rival) for one in others[index + 1 :]]
                 break
+
+
+def _better_equal(
+    final: Fit, ablations: Sequence[Ablation], rivals: Rivals, held_out: Dataset
+) -> tuple[Fit, dict[Key, Sequence[RivalFit]]] | None:
+    """The fit with a rival in the place of a term that training does not tell from it and held-out torque does.
+
+    The term is a rival of it then, with that objection. None where no rival predicts more.
+    """
+    for ablation in ablations:
+        term, own = ablation.term, rivals.get(ablation.term.key, ())
+        for rival in own if ablation.torque else ():
+            other = _instead(final, term, rival.terms[-1], ablation.without) if rival.tied else None
+            if other is None:
+                continue
+            torque = torque_of(other, ablation.without, other.terms[-1], held_out)
+            told = torque and more_torque(ablation.torque, torque) >= CRITERIA.discrepancy
+            if told and bic_margin(other.on(held_out), final.on(held_out)) >= CRITERIA.tied:
+                behind = RivalFit((term,), final.reduced, 0.0, 0.0, other.reduced, objection=_PREDICTS_LESS)
+                rest = [one.beside(rival) for one in own if one is not rival]
+                known = {key: value for key, value in rivals.items() if key != term.key}
+                return other, {**known, other.terms[-1].key: [behind, *rest]}
+    return None
 
 
 def _instead(fit: Fit, dropped: Term, rival: Term, without: Fit) -> Fit | None:

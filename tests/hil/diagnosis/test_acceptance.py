@@ -137,7 +137,9 @@ def test_a_channel_that_pays_is_named() -> None:
     [
         (9.9, 1.0, "", False, True),
         (500.0, 0.004, "", False, True),
-        (500.0, 0.004, "", True, False),
+        (500.0, 0.004, "", True, True),  # below the noise it is a share of the torque
+        (500.0, 0.006, "", True, False),
+        (500.0, float("inf"), "", True, False),  # the torque says nothing
         (10.0, 0.005, "", False, False),
         (-3.0, 0.0, "it is late", False, False),
     ],

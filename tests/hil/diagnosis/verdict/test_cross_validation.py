@@ -100,3 +100,23 @@ def test_the_rival_that_training_does_not_tell_from_a_refuted_term_takes_its_pla
     assert [one.terms for one in proof.rivals[named.key]] == [play.terms]
     objected = replace(offset, objection="it is late")
     assert cross_validate(nominal, wrong, data.over(()), {key: [objected]}).final.terms == ()
+
+
+def test_the_rival_that_predicts_more_of_the_held_out_torque_takes_the_name() -> None:
+    """A spring was named a weight, which training is said not to tell from it."""
+    spring, load = Term("spring_load", 0, (4e3, 0.1)), Term("constant_load", 0, (0.4,))
+    data, held_out = runs(spring), runs(spring, seed=2)
+    nominal = evaluated(Hypothesis(OWNER), data)
+    weight = fitted(Hypothesis(OWNER, (load,)), data, evaluations=6)
+    tied, key = RivalFit((spring,), 1.0, 0.0, 0.0), weight.terms[0].key
+
+    proof = cross_validate(nominal, weight, held_out, {key: [tied]})
+    (named,) = proof.final.terms
+    assert named.effect == "spring_load"
+    assert proof.dropped == ()
+    (rival,) = proof.rivals[named.key]
+    assert rival.terms[0].effect == "constant_load"
+    assert not rival.tied
+
+    refuted = replace(tied, evidence=100.0, more=1.0)
+    assert cross_validate(nominal, weight, held_out, {key: [refuted]}).final.terms[0].effect == "constant_load"

@@ -29,6 +29,7 @@ from hil.importing.draft_map import draft_map
 from hil.importing.joined_logs import join_logs
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import COUNT_AS, take_own_units
+from hil.importing.still_open import still_open
 from hil.recording.recording import Recording, read_recording
 
 # Bench, draft and diagnosis load compiled kernels and more, for which the first look must not wait.
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from hil.bench.bench_file import Bench
     from hil.diagnosis.diagnosis import Diagnosis
     from hil.drafting.drafted_bench import DraftedBench
-    from hil.importing.map_draft import MapDraft
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
 _DRAFTED_WITH = "# Drafted with: "  # options, at the end of a map
@@ -170,7 +170,7 @@ def _recordings(
         recording, notes = _recording(source, first if shared else path, rate_hz, axis)
         read.append(recording)
         assumed += notes
-    return read, assumed
+    return read, list(dict.fromkeys(assumed))
 
 
 def _alike(source: Path, first: Path, rate_hz: float | None, axis: str | None) -> bool:
@@ -208,9 +208,10 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
     options = [*(["--rate", f"{rate_hz:g}"] if rate_hz else []), *(["--axis", axis] if axis else [])]
     mark = f"{_DRAFTED_WITH}{shlex.join(options)}\n"
     command = shlex.join(["hil", "explain", str(source), "--out", str(path.parent), *options])
+    notes = list[str]()
     if is_file(path):
         text = path.read_text(encoding="utf-8")
-        draft = _drafted(source, rate_hz, axis, text)
+        notes = [f"{path}: used as it is for {source.name}", *_still_open(source, rate_hz, axis, path, text)]
     else:
         try:
             draft = draft_map(source, rate_hz, axis)
@@ -220,8 +221,6 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
         path.parent.mkdir(parents=True, exist_ok=True)
         text = map_text(draft) + (mark if options else "")
         write_text(path, text)
-    notes = [f"{path}: used as it is"]
-    if draft is not None:
         notes = [f"{path}: which column is what, units and signs; drafted from the file"]
         notes += [f"{path}: {note}" for note in draft.unsure]
         notes += [f"{path}: column {name!r} is not used: {why}" for name, why in draft.left_out.items()]
@@ -232,17 +231,19 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
         )
     if asked := asked_lines(text):
         told = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
-        raise InputError("\n".join([told, *(f"{path}:{line}: {question}" for line, question in asked)]))
+        lines = [f"{path}:{line}: {question}" for line, question in asked]
+        more = ["Check in it also:", *notes[1:]] if len(notes) > 1 else []
+        raise InputError("\n".join([told, *lines, *more]))
     return import_recording(source, path), notes
 
 
-def _drafted(source: Path, rate_hz: float | None, axis: str | None, text: str) -> MapDraft | None:
-    """The draft of which a map is the text, so that what it assumed holds; None if the map was edited."""
-    with suppress(InputError):
+def _still_open(source: Path, rate_hz: float | None, axis: str | None, path: Path, text: str) -> list[str]:
+    """What the draft of a map assumed and nobody changed in it since; nothing where it cannot be drafted again."""
+    with suppress(InputError, yaml.YAMLError):
         draft = draft_map(source, rate_hz, axis)
         take_own_units(draft)
-        return draft if text.startswith(map_text(draft)) else None
-    return None
+        return [f"{path}: {note}" for note in still_open(draft, text)]
+    return []
 
 
 def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedBench | None, list[str]]:

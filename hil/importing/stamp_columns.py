@@ -194,4 +194,7 @@ def unit_by_step(told: Label, step: float, counts: bool = False) -> tuple[str, s
         )
     if len(plausible) == 1 and not counts:
         return best, ""
-    return best, f"clock: the unit of {told.column!r} is not given; {best} is taken (steps of {step:g} {best})"
+    return best, (
+        f"clock: the unit of {told.column!r} is not given; {best} is taken (steps of {step:g} {best}); if it is "
+        "another one, give the rows per second with --rate"
+    )

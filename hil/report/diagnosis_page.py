@@ -13,12 +13,14 @@ from hil.diagnosis.result import AT_FLOOR, Verdict
 from hil.diagnosis.statement import explained
 from hil.diagnosis.wording import titles, where, whole_name
 from hil.figures.drawing import save
+from hil.importing.own_units import COUNT_AS
 from hil.quantities import digits, percent, reading_unit
 from hil.report.findings_section import findings_section
 from hil.report.fit_section import corrections_section, fit_section
 from hil.report.ledger_report import ledger_section
 from hil.report.page import Page
 
+UNSIZED = "The size of a channel is not known (see What was assumed): values are multiples of the true ones."
 LEGEND = (
     "Colour of the bar: green, all of the mismatch is explained; orange, something is left, doubtful or not searched."
 )
@@ -28,7 +30,9 @@ def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> No
     """Write report.html with its PNGs."""
     result = diagnosis.result
     names = ", ".join(dict.fromkeys(whole_name(run.name) for run in diagnosis.train.runs))
-    page = Page(f"Diagnosis of {names}", _lead(diagnosis), result.statement, explained(result), LEGEND)
+    sized = not any(COUNT_AS in one for one in assumed)
+    verdict = result.statement if sized else f"{UNSIZED} {result.statement}"
+    page = Page(f"Diagnosis of {names}", _lead(diagnosis), verdict, explained(result) and sized, LEGEND)
     findings_section(page, diagnosis, folder)
     _change(page, diagnosis, folder)
     # below the noise of a row no row tells where: the structure does
@@ -47,7 +51,7 @@ def write_page(diagnosis: Diagnosis, folder: Path, assumed: Sequence[str]) -> No
             "position, speed and time.",
         )
     fit_section(page, diagnosis, folder)
-    corrections_section(page, result)
+    corrections_section(page, diagnosis)
     page.heading("What remains unexplained")
     page.text(result.unexplained.description)
     if result.unexplained.share > 0.0 and result.unexplained.description != AT_FLOOR:

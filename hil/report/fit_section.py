@@ -2,12 +2,14 @@
 
 from pathlib import Path
 
+from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
 from hil.diagnosis.pictures.location import residual_panels
-from hil.diagnosis.result import FitFigures, Result
+from hil.diagnosis.result import FitFigures
 from hil.diagnosis.wording import label, spoken, spoken_key, title
 from hil.figures.drawing import save
-from hil.quantities import digits, quantity, reading_unit
+from hil.identification.residual_scales import inertia
+from hil.quantities import digits, quantity, reading_unit, unit_of
 from hil.report import plots
 from hil.report.compare_report import fitted_cells
 from hil.report.page import Page
@@ -72,16 +74,31 @@ def _figures(found: FitFigures, unit: str) -> list[str]:
     return [*("unstable" if value is None else quantity(value, unit) for value in values), over_floor]
 
 
-def corrections_section(page: Page, result: Result) -> None:
-    rows = []
+def corrections_section(page: Page, diagnosis: Diagnosis) -> None:
+    """Parameters of the bench that are corrected; where none is, those that it has."""
+    result, rows = diagnosis.result, list[tuple[str, ...]]()
     for name, one in result.parameter_corrections.items():
         factor, unit = reading_unit(one.unit, max(abs(one.nominal), abs(one.value)))
         values = (factor * value for value in (one.nominal, one.value, one.std))
         rows.append((spoken_key(name), unit, *fitted_cells(*values)))
     if not rows and not result.not_identifiable:
+        _values_of_bench(page, diagnosis.given_bench)
         return
     page.heading("Parameters of the bench")
     if result.not_identifiable:
         page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
     if rows:
         page.table(("parameter", "unit", "bench file", "fitted", "standard error", "change"), rows, left=(0, 1))
+
+
+def _values_of_bench(page: Page, bench: Bench) -> None:
+    found = {name: float(getattr(bench.axis, name)) for name in bench.axis.NOMINAL}
+    if not bench.axis.linear and "inertia_kg_m2" not in found:
+        found = {"inertia at the motor": inertia(bench), **found}
+    rows = []
+    for name, value in found.items():
+        factor, unit = reading_unit("kg m^2" if " " in name else unit_of(name), abs(value))
+        rows.append((name, unit, digits(factor * value, 4)))
+    page.heading("Parameters of the bench")
+    page.text("No correction is told. Masses and inertia are those of all that moves, motor and screw included.")
+    page.table(("parameter", "unit", "bench file"), rows, left=(0, 1))

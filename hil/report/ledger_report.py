@@ -27,7 +27,7 @@ def ledger_section(page: Page, result: Result) -> None:
             left=(0, 2),
             mark=1,
         )
-    page.text(f"{len(result.considered)} fits of mechanisms were considered; diagnosis.json has the ledger of each.")
+    page.text(f"Fits of mechanisms: {len(result.considered)}; diagnosis.json has the ledger of each.")
 
 
 def _outcome(one: CandidateLedger) -> str:

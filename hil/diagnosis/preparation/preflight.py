@@ -142,7 +142,12 @@ def _problems(run: Measured, bench: Bench, derived: set[str], runs: Sequence[Mea
 def _position_problems(run: Measured, bench: Bench, motor: str, table: str) -> Iterator[str]:
     ratio = bench.axis.ratio_m_rad
     slope = _factor_between(run.position_command_m, ratio * run.motor)
-    if abs(slope - 1.0) > SLOPE_TOLERANCE:
+    if bench.axis.turns and abs(slope / ratio - 1.0) < SLOPE_TOLERANCE < abs(slope - 1.0):
+        yield (
+            f"position_command_m: is the angle of the motor, and is to be that of the load, behind a gear of "
+            f"{1.0 / ratio:.6g}; in the import map write so many times its counts per revolution, or scale: {ratio:.6g}"
+        )
+    elif abs(slope - 1.0) > SLOPE_TOLERANCE:
         yield f"{motor}: {_factor(slope, _POSITION_UNITS, 'the set-points')}"
     if not run.table_m.size:
         return

@@ -131,8 +131,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
             rivals, considered = other.rivals, [*considered, *other.considered]
             if effects(other.fit.terms) not in tried:
                 step("searching on with another mechanism in the place of one")
-                base, needed, pruned = _pruned(other.fit, nominal)
-                considered += pruned
+                base, needed, pruned = _pruned(other.fit, beside_loads(nominal, other.fit))
+                base, considered = claimed(base), [*considered, *pruned]
                 tried.append(effects(other.fit.terms))
                 continue
             factors = unexplained_channels(base)

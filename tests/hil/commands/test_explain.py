@@ -73,7 +73,7 @@ def test_a_corrected_bench_is_taken_up_again(explained: tuple[Path, str, str]) -
         assert ran.returncode == 0, ran.stderr
         assert bench.read_text() == mended
         assert "bench.yaml: used as it is" in ran.stderr
-        assert "axis-map.yaml: which column is what" in ran.stderr  # nobody edited it: what it assumed still holds
+        assert "axis-map.yaml: used as it is for axis.csv" in ran.stderr
         found = json.loads((folder / FOLDER / "report" / "diagnosis.json").read_text())
         coulomb = found["parameter_corrections"]["coulomb_torque_n_m"]
         assert coulomb["nominal"] == 0.5
@@ -111,16 +111,37 @@ def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path:
     told = "Nothing tells the size of torque_n_m: values are multiples"
     assert told in " ".join(ran.stdout.split())
     assert told in " ".join(ran.stderr.split())  # before the search
-    assert "its numbers count as N m" in (tmp_path / FOLDER / "report" / "report.html").read_text()
+    page = (tmp_path / FOLDER / "report" / "report.html").read_text()
+    assert "its numbers count as N m" in page
+    assert '<div class="verdict warning">The size of a channel is not known' in page
 
-    again = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
-    assert told in " ".join(again.stdout.split())
 
+def test_what_nobody_changed_in_a_map_is_told_in_every_run(tmp_path: Path) -> None:
+    written(tmp_path, "", 10.0)
+    assert hil(tmp_path, "explain", "axis.csv", "--budget", "5").returncode == 0
     path = tmp_path / FOLDER / "axis-map.yaml"
     path.write_text(path.read_text().replace("about:", "about: edited"))
-    edited = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
-    assert "axis-map.yaml: used as it is" in edited.stderr
-    assert "Nothing tells the size" not in edited.stderr + edited.stdout
+    again = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
+    assert "torque_n_m: its numbers count as N m" in again.stderr
+    assert "Nothing tells the size of torque_n_m" in " ".join(again.stdout.split())
+
+    path.write_text(path.read_text().replace('unit: "N m"', 'unit: "N m"\n    scale: 0.1'))
+    corrected = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
+    assert corrected.returncode == 0, corrected.stderr
+    assert "Nothing tells the size" not in corrected.stderr + corrected.stdout
+    assert printed(corrected.stdout, "inertia_kg_m2") == pytest.approx(INERTIA_KG_M2, rel=0.02)
+
+
+def test_a_question_comes_with_what_else_was_assumed(tmp_path: Path) -> None:
+    """A clock of unknown unit, and a length whose lead nothing tells."""
+    columns = axis(2500)
+    rows = np.column_stack([10 * np.arange(2500), 10.0 * columns["angle"], columns["torque"]])
+    np.savetxt(tmp_path / "axis.csv", rows, delimiter=",", header="tick,len_mm,trq_nm", comments="", fmt="%.9g")
+    ran = hil(tmp_path, "explain", "axis.csv")
+    assert ran.returncode == 2
+    told = " ".join(ran.stderr.split())
+    assert "lead_m: len_mm is a length" in told
+    assert "clock: the unit of 'tick' is not given; ms is taken" in told
 
 
 def test_a_file_that_cannot_be_read_leaves_no_folder(tmp_path: Path) -> None:

@@ -98,4 +98,6 @@ def test_a_counter_of_a_quarter_of_a_microsecond_is_told_by_its_line_and_else_do
     assert time is not None
     assert (time.unit, time.scale) == ("us", 0.25)
     path.write_text("\n".join([*lines[1:], "cnt\tpos\ttorque", *rows]) + "\n")
-    assert "clock: the unit of 'cnt' is not given; us is taken (steps of 4000 us)" in draft_map(path).unsure
+    (note,) = [one for one in draft_map(path).unsure if one.startswith("clock")]
+    assert note.startswith("clock: the unit of 'cnt' is not given; us is taken (steps of 4000 us)")
+    assert "--rate" in note

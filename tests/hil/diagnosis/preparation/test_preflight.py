@@ -211,3 +211,18 @@ def test_a_negative_inertia_of_one_recording_is_no_wrong_sign_beside_others(run:
     turned = replace(changed(run, torque_n_m=-1.0, torque_command_n_m=-1.0), name="turned")
     with pytest.raises(InputError, match="turned: torque_n_m has the wrong sign"):
         preflight([run, turned], OWNER).accepted()
+
+
+def test_a_set_point_that_is_the_angle_of_the_motor_behind_a_gear_is_named() -> None:
+    direct = load_bench("rotary")
+    geared = direct.model_copy(update={"axis": direct.axis.model_copy(update={"gear_ratio": 80.0})})
+    time_s = 1e-3 * np.arange(4000)
+    angle, speed = 5.0 * np.sin(3.0 * time_s), 15.0 * np.cos(3.0 * time_s)
+    torque = 2e-3 * np.gradient(speed, 1e-3) + 0.1 * np.sign(speed) + 0.002 * speed
+    columns = {"motor_position_rad": angle, "torque_n_m": torque, "torque_command_n_m": torque}
+    right, wrong = (
+        Recording("run", {**columns, "position_command_m": command}, 1e-3, {}) for command in (angle / 80.0, angle)
+    )
+    assert len(preflight([right], geared).accepted()) == 1
+    with pytest.raises(InputError, match="behind a gear of 80; in the import map write so many times"):
+        preflight([wrong], geared).accepted()

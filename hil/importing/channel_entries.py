@@ -203,11 +203,9 @@ class ChannelEntries:
         if unit == "counts" and self.unsized:  # its counts are told when those of the encoder are
             ratio = 1.0 if same else counts_ratio(abs(factor))
             given = f"write the same as for {encoder}" if same else f"write {ratio:.6g} times that of {encoder}"
-            if channel == "position_command_m" and same:
-                given += "; that of a load behind a gear as many times as the gear has turns"
+            given += "; behind a gear times its ratio" if channel == "position_command_m" and same else ""
             if channel == "table_position_m" and not same:
-                on_shaft = given.removeprefix("write ")
-                given = f"write those per revolution of the load, or, if it is on the motor's shaft, {on_shaft}"
+                given = f"write those per revolution of the load; on the motor's shaft {given.removeprefix('write ')}"
                 given += "; of a linear scale write counts_per_m in its place, and lead_m above the line 'channels:'"
             keys |= {key: size * ratio for key, size in self.unsized.items()}
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]

@@ -85,7 +85,7 @@ def test_steps_that_an_encoder_follows_are_the_motion(tmp_path: Path, command: s
     assert column_of(draft, "table_position_m") == encoder
     asked = [(one.channel, one.key) for one in draft.asked]
     assert asked == [("motor_position_rad", "counts_per_rev"), ("table_position_m", "counts_per_rev")]
-    told = f"those per revolution of the load, or, if it is on the motor's shaft, 0.375 times that of {command}"
+    told = f"those per revolution of the load; on the motor's shaft 0.375 times that of {command}"
     assert told in draft.asked[1].what
     take_own_units(draft)
     motor, table = (float(str(one.entry["counts_per_rev"])) for one in draft.channels)

@@ -100,3 +100,24 @@ def _filtered(values: FloatArray, period_s: float, order: int, smooth_s: float) 
     if window < 3:
         return np.zeros(values.size) if order else values
     return parabola_filter(values, window, order, period_s)
+
+
+def later_motion(moved: MeasuredMotion, rows: float) -> MeasuredMotion:
+    """Motion `rows` after each row; half a row after it as a mean until the next one. The ends are held.
+
+    Of weights (3,) over neighbours the first moment is the time t, -1 to 1, the second its square and the variance
+    |t| (1 - |t|) / 3 of the mean, 1/12 for half a row.
+    """
+    if rows == 0.0:
+        return moved
+    whole = int(rows)
+    t = rows - whole
+    second = t**2 + abs(t) * (1.0 - abs(t)) / 3.0
+    weights = np.array([0.5 * (second + t), 1.0 - second, 0.5 * (second - t)])  # of the row after, at, before
+    last = moved.position.size - 1
+    shifted = np.clip(np.arange(last + 1) + whole, 0, last)
+
+    def at(values: FloatArray) -> FloatArray:
+        return np.asarray(convolve1d(values[shifted], weights, mode="nearest"), dtype=np.float64)
+
+    return MeasuredMotion(at(moved.position), at(moved.velocity), at(moved.acceleration), moved.direction)

@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d, maximum_filter1d, minimum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.special import ndtri, stdtrit
 
 from hil.arrays import FloatArray
 from hil.identification.derivatives import (
     SMOOTH_S,
     MeasuredMotion,
+    later_motion,
     matched,
     matched_motion,
     noise_gains,
@@ -35,6 +36,7 @@ from hil.identification.derivatives import (
 )
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
 from hil.identification.parallel import one_blas_thread
+from hil.identification.torque_lag import shift_of_torque
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
@@ -45,6 +47,8 @@ _NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes th
 _LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
 _LAW = ("slow", "fast")  # coefficients of a friction that bends at low and at high speed
 _BEND = 0.1  # of the top speed: range of speed in which a friction that falls from rest is felt
+_FARTHEST_ROWS, _FARTHEST_S = 8, 0.04  # lateness of a torque that is sought; the larger of both
+_KEPT = 0.5  # of the sliding rows, at least: others tell the accelerations
 _LOGGED = "logged"  # coefficient of the time of the torque's rows against those of the position
 
 
@@ -85,12 +89,14 @@ class MotionData:
     window: int
     noise: float = 0.0
 
-    def sliding(self, slowest: SlowestSliding) -> NDArray[np.bool_]:
+    def sliding(self, slowest: SlowestSliding, more: int = 0) -> NDArray[np.bool_]:
         """Evaluated rows (n,) about which the axis moves one way, faster than `slowest`, throughout the window.
 
-        A row more on both sides is what a logger's row may hold: a mean until the next one, or the value before.
+        A row more on both sides is what a logger's row may hold: a mean until the next one, or the value before. So are
+        `more` rows for a torque that is recorded late.
         """
-        low, high = (extreme(self.moved.velocity, self.window + 2) for extreme in (minimum_filter1d, maximum_filter1d))
+        width = self.window + 2 + 2 * more
+        low, high = (extreme(self.moved.velocity, width) for extreme in (minimum_filter1d, maximum_filter1d))
         return np.asarray(self.rows & ((low > slowest.away) | (high < -slowest.back)))
 
 
@@ -156,7 +162,7 @@ class PlainModel:
 
     def predict(self, moved: MeasuredMotion) -> FloatArray:
         """Torque (n,) of the model on a motion."""
-        return self.fit.predict(plain_columns(_later(moved, self.early_rows), self.load_ratio, spring=True))
+        return self.fit.predict(plain_columns(later_motion(moved, self.early_rows), self.load_ratio, spring=True))
 
 
 @one_blas_thread
@@ -170,7 +176,10 @@ def fit_plain_model(
     """
     top = max((float(np.max(np.abs(one.moved.velocity[one.rows]), initial=0.0)) for one in data), default=0.0)
     slowest = _slowest(data, top)
-    sliding = [one.sliding(slowest) for one in data]
+    # half the shortest window and a row: so far about a sliding row the axis moves the same way
+    most = min(min(one.window, window_rows(one.period_s)) // 2 + 1 for one in data)
+    far = _far(data, slowest, load_ratio)
+    sliding = [one.sliding(slowest, abs(far)) for one in data]
     gains = [noise_gains(one.period_s, one.window) for one in data]
     samples = sum(gain[0] ** 2 * rows.sum() for gain, rows in zip(gains, sliding, strict=True))
     if samples < _FEWEST:
@@ -191,7 +200,7 @@ def fit_plain_model(
     def stacked(names: Sequence[str], early_rows: float, slope: LinearFit | None = None) -> dict[str, FloatArray]:
         found = []
         for one, rows in used:
-            every = {**plain_columns(_later(one.moved, early_rows), load_ratio, spring=True)}
+            every = {**plain_columns(later_motion(one.moved, early_rows), load_ratio, spring=True)}
             speed = every["viscous"] / top
             every |= {"slow": every["coulomb"] * np.exp(-np.abs(speed) / _BEND), "fast": speed * np.abs(speed)}
             if slope is not None:  # change of the torque per row
@@ -215,12 +224,11 @@ def fit_plain_model(
         ]
         return min(earned, key=lambda one: one.held_out, default=plain)
 
-    best, early_rows = structure(0.0), 0.0
-    # half the shortest window and a row: so far about a sliding row the axis moves the same way
-    most = min(min(one.window, window_rows(one.period_s)) // 2 + 1 for one, _ in used)
+    best, early_rows = structure(0.0), float(far)
+    begin = structure(early_rows) if far else best
     for _ in range(8):
-        timed = fitted(stacked(best.names, early_rows, best))
-        early_rows = float(np.clip(early_rows + timed[_LOGGED].value, -most, most))
+        timed = fitted(stacked(begin.names, early_rows, begin))
+        early_rows = float(np.clip(early_rows + timed[_LOGGED].value, far - most, far + most))
         if abs(timed[_LOGGED].value) < 0.1 * timed[_LOGGED].std_error:
             break
     again = structure(early_rows)
@@ -244,6 +252,20 @@ def fit_plain_model(
     return PlainModel(fit, slowest, load_ratio, early_rows, timed[_LOGGED].std_error if early_rows else 0.0)
 
 
+def _far(data: Sequence[MotionData], slowest: SlowestSliding, load_ratio: float | None) -> int:
+    """Whole rows by which the torque is recorded before its motion, see `shift_of_torque`."""
+    farthest = max(_FARTHEST_ROWS, round(_FARTHEST_S / data[0].period_s))
+    thin = [max(one.window // 4, 1) for one in data]
+    rows = [np.flatnonzero(one.sliding(slowest, farthest))[::every] for one, every in zip(data, thin, strict=True)]
+    sliding = sum(np.count_nonzero(one.sliding(slowest)) // every for one, every in zip(data, thin, strict=True))
+    samples = sum(4.0 * at.size * every / one.window for one, at, every in zip(data, rows, thin, strict=True))
+    if samples < 10 * _FEWEST or sum(at.size for at in rows) < _KEPT * sliding:
+        return 0
+    tables = [np.column_stack([*plain_columns(one.moved, load_ratio, spring=True).values()]) for one in data]
+    step = max(min(one.window for one in data) // 8, 1)
+    return shift_of_torque([one.torque for one in data], tables, rows, range(-farthest, farthest + 1, step), samples)
+
+
 def _slowest(data: Sequence[MotionData], top: float) -> SlowestSliding:
     """A share of the top speed `top` of both ways; of its own top where an axis only creeps back, above its noise.
 
@@ -263,24 +285,3 @@ def _slowest(data: Sequence[MotionData], top: float) -> SlowestSliding:
         for one in data
     )
     return other if samples >= _OTHER_WAY else both
-
-
-def _later(moved: MeasuredMotion, rows: float) -> MeasuredMotion:
-    """Motion `rows` after each row; half a row after it as a mean until the next one. The ends are held.
-
-    Of weights (3,) over neighbours the first moment is the time t, -1 to 1, the second its square and the variance
-    |t| (1 - |t|) / 3 of the mean, 1/12 for half a row.
-    """
-    if rows == 0.0:
-        return moved
-    whole = int(rows)
-    t = rows - whole
-    second = t**2 + abs(t) * (1.0 - abs(t)) / 3.0
-    weights = np.array([0.5 * (second + t), 1.0 - second, 0.5 * (second - t)])  # of the row after, at, before
-    last = moved.position.size - 1
-    shifted = np.clip(np.arange(last + 1) + whole, 0, last)
-
-    def at(values: FloatArray) -> FloatArray:
-        return np.asarray(convolve1d(values[shifted], weights, mode="nearest"), dtype=np.float64)
-
-    return MeasuredMotion(at(moved.position), at(moved.velocity), at(moved.acceleration), moved.direction)

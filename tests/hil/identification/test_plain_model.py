@@ -221,6 +221,22 @@ def test_torque_that_is_a_mean_until_the_next_row_is_found_to_be_early() -> None
     assert model["coulomb"].value == pytest.approx(0.7, rel=0.02)
 
 
+@pytest.mark.parametrize("late_s", [0.018, 0.03, -0.015])
+def test_a_torque_that_is_late_by_more_than_its_window_is_found(late_s: float) -> None:
+    """Rows of 5 ms. About each reversal the torque of the other way is still recorded."""
+    step, time = 5, np.arange(60_000) * 1e-3
+    velocity = 6.3 * np.cos(2.1 * time) + 7.95 * np.cos(5.3 * time)
+    acceleration = -13.23 * np.sin(2.1 * time) - 42.135 * np.sin(5.3 * time)
+    torque = 0.02 * acceleration + 0.1 * velocity + 0.7 * np.sign(velocity)
+    recorded = np.interp(time - late_s, time, torque)[::step]
+    recorded += 0.05 * np.random.default_rng(1).normal(size=recorded.size)
+    position = (3.0 * np.sin(2.1 * time) + 1.5 * np.sin(5.3 * time))[::step]
+    model = fitted(position, recorded, None, 0.005)
+    assert model.early_rows == pytest.approx(-late_s / 0.005, abs=0.2)
+    assert model["inertia"].value == pytest.approx(0.02, rel=0.02)
+    assert model["coulomb"].value == pytest.approx(0.7, rel=0.02)
+
+
 def test_one_speed_does_not_tell_coulomb_from_viscous_friction() -> None:
     data = []
     for way in (1.0, -1.0):

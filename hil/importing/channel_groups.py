@@ -64,7 +64,7 @@ def _runs_joined(groups: Sequence[Group]) -> list[Group]:
     Stamps that begin anew go on after the gap; without stamps it is rows without values.
     """
     runs = [one for one in groups if _RUN.fullmatch(one.name.rpartition(".")[2]) and _is_table(one)]
-    alike = [one for one in runs if set(one.channels) == set(runs[0].channels) and one.has_clock == runs[0].has_clock]
+    alike = [one for one in runs if _says(one) == _says(runs[0])]
     if len(alike) < 2 or len(alike) < len(runs):
         return list(groups)
     first = alike[0]
@@ -79,6 +79,11 @@ def _runs_joined(groups: Sequence[Group]) -> list[Group]:
             joined[name] = np.concatenate([before, np.full((gap, *before.shape[1:]), np.nan), values])
     whole = Group(first.name, joined, first.units, first.has_clock)
     return [whole if one is first else one for one in groups if one is first or one not in alike]
+
+
+def _says(group: Group) -> tuple[dict[str, str], bool]:
+    """Units of the channels of a group by name, and whether it has a clock."""
+    return {name: group.units.get(name, "") for name in group.channels}, group.has_clock
 
 
 def _is_table(group: Group) -> bool:

@@ -35,6 +35,14 @@ def test_two_runs_in_one_file_are_parts_of_one_recording(library: str, stamps: b
     assert np.allclose(other.columns["torque_n_m"], TORQUE[:1500])
 
 
+def test_runs_in_other_units_stay_apart(tmp_path: Path) -> None:
+    values = {"angle": np.arange(10.0), "torque": np.arange(10.0)}
+    groups = [Group(f"run_{number}", values, {"angle": unit}, False) for number, unit in ((1, "rad"), (2, "deg"))]
+    arrays, units = one_length(tmp_path / "axis.h5", groups)
+    assert set(arrays) == {"run_1.angle", "run_1.torque", "run_2.angle", "run_2.torque"}
+    assert units == {"run_1.angle": "rad", "run_2.angle": "deg"}
+
+
 @pytest.mark.parametrize(
     ("names", "channels"),
     [

@@ -6,6 +6,7 @@ Groups of a file that are runs of one axis, one after the other, are one group: 
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from hil.files.input_file import check_values
 
 CLOCK = "time"  # channel of stamps that have no name in the file
 _RUN = re.compile(
-    r"(?:run|test|trial|scan|take|shot|rec\w*|meas\w*|mess\w*|versuch|fahrt|lauf|essai|prueba)[ _.-]*\d+", re.I
+    r"(?:run|test|trial|scan|meas|measurement|messung|versuch|fahrt|essai|prueba)[ _.-]*\d+", re.IGNORECASE
 )
 _APART = 100  # rows between two runs, more than a gap that is interpolated
 _FEWEST = 2  # channels: position and torque
@@ -65,7 +66,7 @@ def _runs_joined(groups: Sequence[Group]) -> list[Group]:
     """
     runs = [one for one in groups if _RUN.fullmatch(one.name.rpartition(".")[2]) and _is_table(one)]
     alike = [one for one in runs if _says(one) == _says(runs[0])]
-    if len(alike) < 2 or len(alike) < len(runs):
+    if len(alike) < 2 or len(alike) < len(groups) or not _in_turn(alike):
         return list(groups)
     first = alike[0]
     joined = {name: np.asarray(first.channels[name], dtype=np.float64) for name in first.channels}
@@ -81,6 +82,19 @@ def _runs_joined(groups: Sequence[Group]) -> list[Group]:
     return [whole if one is first else one for one in groups if one is first or one not in alike]
 
 
+def _in_turn(runs: Sequence[Group]) -> bool:
+    """True for runs without clocks, or with stamps of one rate that begin anew or later than the run before ends."""
+    if not runs[0].has_clock:
+        return True
+    clocks = [np.asarray(next(iter(run.channels.values())), dtype=np.float64) for run in runs]
+    steps = [float(np.median(np.diff(one))) for one in clocks]
+    even = all(abs(step - steps[0]) <= 0.01 * abs(steps[0]) for step in steps)
+    return even and all(
+        abs(later[0] - clocks[0][0]) < steps[0] or later[0] > before[-1] + _APART * steps[0]
+        for before, later in pairwise(clocks)
+    )
+
+
 def _says(group: Group) -> tuple[dict[str, str], bool]:
     """Units of the channels of a group by name, and whether it has a clock."""
     return {name: group.units.get(name, "") for name in group.channels}, group.has_clock
@@ -89,7 +103,9 @@ def _says(group: Group) -> tuple[dict[str, str], bool]:
 def _is_table(group: Group) -> bool:
     """True for numbers of one length in several channels."""
     values = [np.asarray(one) for one in group.channels.values()]
-    numbers = all(one.dtype.kind in "fiub" and one.ndim for one in values)
+    numbers = all(one.dtype.kind in "fiub" and one.ndim == 1 and one.size > 1 for one in values)
+    if numbers and group.has_clock and not np.isfinite(values[0]).all():
+        return False
     return numbers and len(values) >= _FEWEST + group.has_clock and len({len(one) for one in values}) == 1
 
 

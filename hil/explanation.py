@@ -211,7 +211,7 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
     notes = list[str]()
     if is_file(path):
         text = path.read_text(encoding="utf-8")
-        notes = [f"{path}: used as it is for {source.name}", *_still_open(source, rate_hz, axis, path, text)]
+        notes = [f"{path}: used as it is for {source.name}", *_still_open(source, path, text)]
     else:
         try:
             draft = draft_map(source, rate_hz, axis)
@@ -237,10 +237,12 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
     return import_recording(source, path), notes
 
 
-def _still_open(source: Path, rate_hz: float | None, axis: str | None, path: Path, text: str) -> list[str]:
-    """What the draft of a map assumed and nobody changed in it since; nothing where it cannot be drafted again."""
-    with suppress(InputError, yaml.YAMLError):
-        draft = draft_map(source, rate_hz, axis)
+def _still_open(source: Path, path: Path, text: str) -> list[str]:
+    """Doubts of the draft of a map that its user has not settled; none where it cannot be drafted again."""
+    with suppress(InputError, ValueError, yaml.YAMLError):  # of what a user wrote
+        words = shlex.split("".join(text.partition(_DRAFTED_WITH)[2].splitlines()[:1]))
+        options = dict(zip(words[::2], words[1::2], strict=True))
+        draft = draft_map(source, float(options["--rate"]) if "--rate" in options else None, options.get("--axis"))
         take_own_units(draft)
         return [f"{path}: {note}" for note in still_open(draft, text)]
     return []

@@ -116,11 +116,12 @@ def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path:
     assert '<div class="verdict warning">The size of a channel is not known' in page
 
 
-def test_what_nobody_changed_in_a_map_is_told_in_every_run(tmp_path: Path) -> None:
+def test_a_doubt_about_a_map_is_told_until_it_is_settled(tmp_path: Path) -> None:
     written(tmp_path, "", 10.0)
     assert hil(tmp_path, "explain", "axis.csv", "--budget", "5").returncode == 0
     path = tmp_path / FOLDER / "axis-map.yaml"
-    path.write_text(path.read_text().replace("about:", "about: edited"))
+    edited = path.read_text().replace("about:", "about: edited")
+    path.write_text(edited.replace('unit: "N m"', 'unit: "N m"\n    offset: 0.0'))
     again = hil(tmp_path, "explain", "axis.csv", "--budget", "5")
     assert "torque_n_m: its numbers count as N m" in again.stderr
     assert "Nothing tells the size of torque_n_m" in " ".join(again.stdout.split())
@@ -130,6 +131,17 @@ def test_what_nobody_changed_in_a_map_is_told_in_every_run(tmp_path: Path) -> No
     assert corrected.returncode == 0, corrected.stderr
     assert "Nothing tells the size" not in corrected.stderr + corrected.stdout
     assert printed(corrected.stdout, "inertia_kg_m2") == pytest.approx(INERTIA_KG_M2, rel=0.02)
+
+
+def test_the_rate_of_a_first_run_is_read_from_the_map(tmp_path: Path) -> None:
+    """Neither stamps nor a unit of the torque: what is doubtful is told without the option, too."""
+    columns = axis(2500)
+    rows = np.column_stack([columns["angle"], columns["torque"]])
+    np.savetxt(tmp_path / "axis.csv", rows, delimiter=",", header="angle [rad],torque", comments="", fmt="%.9g")
+    for options in (["--rate", "500"], []):
+        ran = hil(tmp_path, "explain", "axis.csv", "--budget", "5", *options)
+        assert ran.returncode == 0, ran.stderr
+        assert "Nothing tells the size of torque_n_m" in " ".join(ran.stdout.split())
 
 
 def test_a_question_comes_with_what_else_was_assumed(tmp_path: Path) -> None:

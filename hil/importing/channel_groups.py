@@ -77,7 +77,7 @@ def _runs_joined(groups: Sequence[Group]) -> list[Group]:
             values = np.asarray(run.channels[name], dtype=np.float64)
             if name == clock:
                 values = _after(before, values)
-            joined[name] = np.concatenate([before, np.full((gap, *before.shape[1:]), np.nan), values])
+            joined[name] = np.concatenate([before, np.full(gap, np.nan), values])
     whole = Group(first.name, joined, first.units, first.has_clock)
     return [whole if one is first else one for one in groups if one is first or one not in alike]
 
@@ -111,8 +111,9 @@ def _is_table(group: Group) -> bool:
 
 def _after(before: Any, stamps: Any) -> Any:
     """Stamps (n,) as they are where they follow those before, else moved behind them and a gap."""
-    step = float(np.median(np.diff(before))) if before.size > 1 else 1.0
-    return stamps if stamps[0] > before[-1] else stamps - stamps[0] + before[-1] + _APART * step
+    if stamps[0] > before[-1]:
+        return stamps
+    return stamps - stamps[0] + before[-1] + _APART * float(np.median(np.diff(before)))
 
 
 def _ended(values: Any, rows: int) -> Any:

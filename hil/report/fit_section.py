@@ -92,12 +92,12 @@ def corrections_section(page: Page, diagnosis: Diagnosis) -> None:
 
 
 def _values_of_bench(page: Page, bench: Bench) -> None:
-    found = {name: float(getattr(bench.axis, name)) for name in bench.axis.NOMINAL}
-    if not bench.axis.linear and "inertia_kg_m2" not in found:
-        found = {"inertia at the motor": inertia(bench), **found}
+    found = [(name, unit_of(name), float(getattr(bench.axis, name))) for name in bench.axis.NOMINAL]
+    if not bench.axis.linear and "inertia_kg_m2" not in bench.axis.NOMINAL:
+        found.insert(0, ("inertia at the motor", "kg m^2", inertia(bench)))
     rows = []
-    for name, value in found.items():
-        factor, unit = reading_unit("kg m^2" if " " in name else unit_of(name), abs(value))
+    for name, si, value in found:
+        factor, unit = reading_unit(si, abs(value))
         rows.append((name, unit, digits(factor * value, 4)))
     page.heading("Parameters of the bench")
     page.text("No correction is told. Masses and inertia are those of all that moves, motor and screw included.")

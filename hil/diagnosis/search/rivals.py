@@ -24,7 +24,9 @@ from hil.identification.inference import Filter, bic_gain, bic_margin, refuted, 
 from hil.identification.terms import Term, is_frequent
 from hil.twin.library import BY_ID
 
-NEAR = 1.1  # cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared
+# Cost over that of the chosen explanation, up to which the fit of a rival is ended before it is compared, and is
+# compared again beside further terms (`search.exchange`).
+NEAR = 1.1
 ENDED = 40  # evaluations: a fit that starts near its minimum converges within them
 
 

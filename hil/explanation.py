@@ -24,6 +24,7 @@ from hil.errors import InputError, PartOfAxis, RateNeeded
 from hil.exchange.own_file import read_exported
 from hil.files.input_file import is_file
 from hil.files.output import rewritten_folder, write_text
+from hil.files.yaml_model import yaml_text
 from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.joined_logs import join_logs
@@ -210,7 +211,7 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
     command = shlex.join(["hil", "explain", str(source), "--out", str(path.parent), *options])
     notes = list[str]()
     if is_file(path):
-        text = path.read_text(encoding="utf-8")
+        text = yaml_text(path)
         notes = [f"{path}: used as it is for {source.name}", *_still_open(source, path, text)]
     else:
         try:
@@ -257,7 +258,7 @@ def _bench(recordings: Sequence[Recording], path: Path) -> tuple[Bench, DraftedB
 
     state, notes = None, list[str]()
     if is_file(path):
-        state = draft_state(path.read_text(encoding="utf-8"), recordings)
+        state = draft_state(yaml_text(path), recordings)
         if state is None or state.edited or not state.outdated:
             changed = [f"{path}: {OUTDATED}"] if state and state.outdated else []
             return load_bench(path), None, [*changed, f"{path}: used as it is"]

@@ -100,16 +100,20 @@ for _tag, _pattern, _first in (
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(rf"^(?:{_pattern})$"), _first)
 
 
-def _read(path: Path) -> tuple[yaml.Node, Any]:
-    """The node tree, which knows lines, and the plain data of a file."""
+def yaml_text(path: Path) -> str:
+    """The text of a YAML file. Raises InputError where it is no file, too large, or not UTF-8."""
     check_file(path, "the path of a YAML file", MOST_BYTES)
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a YAML file") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: byte {error.start} is not UTF-8; give a YAML text file") from None
-    loader = None
+
+
+def _read(path: Path) -> tuple[yaml.Node, Any]:
+    """The node tree, which knows lines, and the plain data of a file."""
+    text, loader = yaml_text(path), None
     try:
         loader = _Loader(text)
         root = loader.get_single_node()

@@ -105,8 +105,11 @@ class Hypothesis:
 
     @property
     def given(self) -> "Hypothesis":
-        """The hypothesis with the nominal parameters as the bench file gives them."""
-        return self.moved(np.concatenate([self._initial[: self.nominal_count], self.x[self.nominal_count :]]))
+        """The hypothesis with the nominal parameters as the bench file gives them; a delay of the torque, which is of
+        the recording, stays.
+        """
+        from_file = np.array([name != DELAY for name in self.nominal] + [False] * (self.x.size - self.nominal_count))
+        return self.moved(np.where(from_file, self._initial, self.x))
 
     # --- parameters ---
 

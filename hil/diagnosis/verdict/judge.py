@@ -59,16 +59,18 @@ def judge(tested: Tested) -> Judged:
         of_plant = Verdict.AXIS_CHANGED
     verdict = law.verdict(of_plant)
     is_part = verdict is Verdict.UNEXPLAINED and not change and explains_most(searched.nominal, final, held_out)
+    nominal = refit.fit
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
         as_given = of_plant is Verdict.NO_MISMATCH and given_stands(searched.given, held_out)
+        nominal = searched.given if as_given else nominal
         final = searched.given if as_given else whole if of_plant is Verdict.AXIS_CHANGED else refit.fit
     # a parameter error is located and measured against the parameters of the bench file
-    before = searched.given if of_plant is Verdict.PARAMETER_ERROR else refit.fit
+    before = searched.given if of_plant is Verdict.PARAMETER_ERROR else nominal
     of_parts = change.parts if change and change.explains_all else ()
     of_each = [one for part in of_parts for one in structure_left(part, part.data.over([]))]
     left = tuple(sorted(of_each, key=lambda one: -one.explained)) if of_parts else structure_left(final, held_out)
     maps = () if change else unnamed_terms(final, left, held_out)
-    return Judged(tested, of_plant, verdict, change, is_part, refit.fit, before, final, left, maps)
+    return Judged(tested, of_plant, verdict, change, is_part, nominal, before, final, left, maps)
 
 
 def _with_loads(refit: Fit, final: Fit) -> Fit:

@@ -183,3 +183,14 @@ def test_a_run_of_a_bench_needs_neither_map_nor_draft(tmp_path: Path) -> None:
     assert ran.returncode == 0, ran.stderr
     assert {path.name for path in (tmp_path / "explained-run").iterdir()} == {"report"}
     assert "the bench with which it was recorded" in ran.stderr
+
+
+@pytest.mark.parametrize("name", ["axis-map.yaml", "bench.yaml"])
+def test_a_map_or_bench_of_another_encoding_is_refused(tmp_path: Path, name: str) -> None:
+    table = written(tmp_path).name
+    (tmp_path / FOLDER).mkdir()
+    (tmp_path / FOLDER / name).write_bytes("# Prüfstand\n".encode("latin-1"))
+    ran = hil(tmp_path, "explain", table)
+    assert ran.returncode == 2
+    assert f"{name}: byte 4 is not UTF-8; give a YAML text file" in ran.stderr.replace("\n", " ")
+    assert "Traceback" not in ran.stderr

@@ -9,7 +9,7 @@ started at strengths with the same torque at creep, where all torque is Coulomb 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -202,6 +202,16 @@ def observable(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:
     if not bench.has_table_encoder:
         return felt_by_motor(mechanism, variant, bench)
     return variant.observable is None or variant.observable(True)
+
+
+def other_variants(term: Term, bench: Bench) -> list[Term]:
+    """The term in each other variant that a bench can show, at values that give nearly the same effect."""
+    mechanism = BY_ID[term.effect]
+    return [
+        replace(term, variant=number, values=tuple(mechanism.search.as_variant(term.values, term.variant, number)))
+        for number, variant in enumerate(mechanism.variants)
+        if number != term.variant and observable(mechanism, variant, bench)
+    ]
 
 
 def felt_by_motor(mechanism: Mechanism, variant: Variant, bench: Bench) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from hil.arrays import FloatArray, SingleArray
 from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.search.initial_values import likenesses, observable
+from hil.diagnosis.search.initial_values import likenesses, other_variants
 from hil.diagnosis.search.score_test import Candidate, offered
 from hil.identification.coordinates import LAST_EDGE_STEP_S, TRUST
 from hil.identification.estimator import Estimator, Fit
@@ -23,7 +23,7 @@ from hil.identification.levenberg_marquardt import damped_step, normal_equations
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
 from hil.identification.residual_scales import TORQUE_ACCURACY, inertia
-from hil.identification.terms import Term, compatible
+from hil.identification.terms import compatible
 from hil.identification.window_fit import fit_windows
 from hil.twin.library import BY_ID
 
@@ -212,13 +212,7 @@ class _Race:
 
     def _variants(self, fit: Fit) -> list[Fit]:
         """Fit the other variants of the last term from its values."""
-        last, rebased = fit.terms[-1], fit.hypothesis.rebased
-        mechanism = BY_ID[last.effect]
-        others = [
-            _as_variant(last, number)
-            for number, variant in enumerate(mechanism.variants)
-            if number != last.variant and observable(mechanism, variant, fit.bench)
-        ]
+        rebased, others = fit.hypothesis.rebased, other_variants(fit.terms[-1], fit.bench)
         return in_parallel([partial(_fit_fast_first, fit.estimator, rebased.replaced(-1, term)) for term in others])
 
     def _equivalents(self, fit: Fit) -> list[Fit]:
@@ -269,12 +263,6 @@ def _edges_moved(fit: Fit) -> Fit:
             shifted = [hypothesis.moved(x) for x in np.clip(edges, *hypothesis.bounds)]
             hypothesis = min(POOL.map(fit.estimator.evaluate, shifted), key=lambda other: other.cost).hypothesis
     return fit.estimator.fit(hypothesis, evaluations=LONG)
-
-
-def _as_variant(term: Term, variant: int) -> Term:
-    """The term in another variant, at values that give nearly the same effect."""
-    values = BY_ID[term.effect].search.as_variant(term.values, term.variant, variant)
-    return replace(term, variant=variant, values=tuple(values))
 
 
 def _rather(fit: Fit, known: Fit) -> bool:

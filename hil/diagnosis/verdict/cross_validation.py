@@ -20,6 +20,7 @@ from hil.diagnosis.ledger import Ledger, accepted, examine, refusal
 from hil.diagnosis.search.addition import Addition, Harm, harm, torque_of
 from hil.diagnosis.search.force_windows import strength_told
 from hil.diagnosis.search.forward_selection import claimed
+from hil.diagnosis.search.initial_values import other_variants
 from hil.diagnosis.search.rivals import ENDED, RivalFit, more_torque
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.diagnosis.verdict.strength import strength_over_error
@@ -95,8 +96,8 @@ class CrossValidation:
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals | None = None) -> CrossValidation:
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first.
 
-    The strongest rival that the training recordings do not tell from a dropped term takes its place, and is tested in
-    turn. So does one that predicts the torque of held-out motion better.
+    The strongest rival that the training recordings do not tell from a dropped term takes its place, or another variant
+    of the same mechanism, and is tested in turn. So does one that predicts the torque of held-out motion better.
     """
     dropped: list[Ablation] = []
     known = dict(rivals or {})
@@ -115,11 +116,15 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals |
         fit, rest = final, worst.without
         final = claimed(rest.refit(30)) if rest.terms else rest
         others = known.pop(worst.term.key, ())
+        tried = {one.term.key for one in dropped}
         for index, rival in enumerate(others):
             if rival.tied and (other := _instead(fit, worst.term, rival.terms[-1], final)):
                 final = other
                 known[final.terms[-1].key] = [one.beside(rival) for one in others[index + 1 :]]
                 break
+        else:
+            forms = [one for one in other_variants(worst.term, fit.bench) if one.key not in tried]
+            final = next((other for one in forms if (other := _instead(fit, worst.term, one, final))), final)
 
 
 def _better_equal(

@@ -7,6 +7,7 @@ import pytest
 from diagnosis_runs import bench, dataset, recorded
 
 from hil.bench.bench_file import MechanismEntry, load_bench
+from hil.bench.control_section import UnknownControl
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
@@ -59,3 +60,15 @@ def test_differences_are_wide_where_a_nut_may_chatter() -> None:
     loose = Hypothesis(owner, (Term("backlash", 0, (4e-6,)),)).steps(0.1, 20.0, LAST_EDGE_STEP_S)
     assert plain.max() < CHATTER_STEP
     assert np.all(loose[: plain.size] == CHATTER_STEP)
+
+
+def test_the_delay_of_the_torque_is_not_of_the_bench_file() -> None:
+    """Parameters of the file stand beside the delay that the recordings have."""
+    control = UnknownControl(law="unknown", velocity_period_s=OWNER.period_s, torque_delay_s=0.0)
+    start = Hypothesis(OWNER.model_copy(update={"control": control}), (LOAD,))
+    fitted = start.moved(start.x + 0.2)
+    given = dict(zip(start.nominal, fitted.given.values, strict=False))
+    assert given.pop("torque_delay_s") == pytest.approx(0.2 * OWNER.period_s)
+    file = dict(zip(start.nominal, start.values, strict=False))
+    assert given == pytest.approx({name: file[name] for name in given})
+    assert fitted.given.terms == fitted.terms

@@ -120,3 +120,16 @@ def test_the_rival_that_predicts_more_of_the_held_out_torque_takes_the_name() ->
 
     refuted = replace(tied, evidence=100.0, more=1.0)
     assert cross_validate(nominal, weight, held_out, {key: [refuted]}).final.terms[0].effect == "constant_load"
+
+
+def test_another_variant_of_a_dropped_mechanism_takes_its_place() -> None:
+    """The second encoder is late; a motor's encoder that is early moves the torque against the motion too."""
+    late = Term("channel_time_skew", 0, (2e-3,))
+    data = runs(late)
+    nominal = evaluated(Hypothesis(OWNER), data)
+    early = evaluated(Hypothesis(OWNER, (Term("channel_time_skew", 2, (-2e-3,)),)), data)
+    proof = cross_validate(nominal, early, data.over(()))
+    (named,) = proof.final.terms
+    assert (named.effect, named.variant) == ("channel_time_skew", 0)
+    assert named.values[0] == pytest.approx(2e-3, rel=0.02)
+    assert [one.term.variant for one in proof.dropped] == [2]

@@ -168,7 +168,7 @@ def _positions(
         told = [name for name in measured if labels[name].motor or labels[name].table or labels[name].measured]
         plain = [name for name in measured if name not in (*told, *encoders) and not _turns(name, measured, labels)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
-        if not commands and len(measured) == 2 and plain and not told:
+        if not commands and len(measured) == 2 and plain and not encoders:
             driving = [live[name] for name in efforts]
             commands, why = unanswered_one({name: live[name] for name in measured}, driving, period_s)
             commands = [name for name in commands if name in plain]  # an encoder is none

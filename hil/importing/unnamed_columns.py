@@ -85,20 +85,24 @@ def _switches(values: FloatArray) -> bool:
 def _better_as_told(best: str, live: dict[str, FloatArray], told: dict[str, Label], period_s: float) -> str:
     """Speed by its letter that explains the efforts better than `best` does as a position; "" without one.
 
-    The efforts are those that letters name, else the columns of which nothing is told.
+    The efforts are those that letters name, else the columns of which nothing is told. A speed that is the derivative
+    of `best` says that it is one.
     """
     speeds = [name for name in live if told[name].quantity is Quantity.VELOCITY and not told[name].command]
+    moved = motion(live[best], period_s)
+    if any(derivative_of(live[name], moved, period_s).share > IS_DERIVATIVE for name in speeds):
+        return ""
     kinds = [[name for name in live if told[name].quantity is kind] for kind in (Quantity.EFFORT, Quantity.UNKNOWN)]
     efforts = [name for name in kinds[0] or kinds[1] if name != best]
 
-    def explained(moved: MeasuredMotion) -> float:
-        return max(driven(live[name], moved, period_s).share for name in efforts)
+    def explained(of: MeasuredMotion) -> float:
+        return max(driven(live[name], of, period_s).share for name in efforts)
 
     if not speeds or not efforts:
         return ""
     by_speed = {name: explained(motion(np.cumsum(live[name]) * period_s, period_s)) for name in speeds}
     speed = max(by_speed, key=lambda name: by_speed[name])
-    return speed if by_speed[speed] > explained(motion(live[best], period_s)) else ""
+    return speed if by_speed[speed] > explained(moved) else ""
 
 
 def _as_position(name: str, live: dict[str, FloatArray], period_s: float) -> float:

@@ -134,6 +134,16 @@ def test_the_rate_is_an_attribute_of_the_group_or_of_the_file(at: str, tmp_path:
     assert imported(path).period_s == pytest.approx(1e-3)
 
 
+def test_a_number_before_the_unit_of_an_attribute_is_a_factor(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["sample_rate_Hz"] = 1000.0
+        for name, values, unit in (("s_act", np.degrees(ANGLE) / 1e-3, "0.001 deg"), ("i_q", TORQUE, "Nm")):
+            file.create_dataset(name, data=values).attrs["unit"] = unit
+    np.testing.assert_allclose(imported(path)["motor_position_rad"], ANGLE, atol=1e-9)
+
+
 def test_an_attribute_that_groups_give_with_different_values_is_none(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"

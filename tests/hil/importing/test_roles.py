@@ -50,6 +50,24 @@ def test_a_speed_by_its_letter_is_no_position_where_it_explains_a_column_better(
     }
 
 
+def test_a_named_speed_tells_that_a_coarse_column_without_a_name_is_its_position(tmp_path: Path) -> None:
+    """The speed explains the torque better than 200 counts of a turn, and is their derivative."""
+    steps = np.round(AXIS["angle"] / (2.0 * np.pi / 200.0))
+    columns = {"t_s": AXIS["t"], "q1": steps, "speed_rad_s": AXIS["speed"], "torque_Nm": AXIS["torque"]}
+    draft = draft_map(write(tmp_path / "log.csv", columns))
+    assert {one.channel: one.entry["column"] for one in draft.channels}["motor_position_rad"] == "q1"
+
+
+def test_a_position_without_a_word_beside_a_measured_one_is_a_set_point_if_it_explains_less(tmp_path: Path) -> None:
+    count = 2 * np.pi / 8192
+    late = np.round(np.interp(AXIS["t"] + 0.004, AXIS["t"], AXIS["angle"]) / count)
+    columns = {"t_s": AXIS["t"], "lim_pos_cnt": late, "act_pos_cnt": np.round(AXIS["angle"] / count)}
+    draft = draft_map(write(tmp_path / "log.csv", {**columns, "torque_Nm": AXIS["torque"]}))
+    found = {one.channel: one.entry["column"] for one in draft.channels}
+    assert (found["motor_position_rad"], found["position_command_m"]) == ("act_pos_cnt", "lim_pos_cnt")
+    assert "table_position_m" not in found
+
+
 def test_row_numbers_are_no_torque_where_one_is_named(tmp_path: Path) -> None:
     columns = {"No": np.arange(1.0, AXIS["t"].size + 1), "t": AXIS["t"], "n": AXIS["speed"], "torque": AXIS["torque"]}
     draft = draft_map(write(tmp_path / "log.csv", columns))

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
+from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from hil.drafting.drafted_bench import DraftedBench
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
+_FOUND = 1e-3  # relative error of the size of a unit that is found by a relation of two columns
 _DRAFTED_WITH = "# Drafted with: "  # options, at the end of a map
 OUTDATED = (
     "THE MAP OR THE DATA CHANGED since it was drafted. It was edited, so it is kept, with values of the former map; "
@@ -178,8 +180,17 @@ def _alike(source: Path, first: Path, rate_hz: float | None, axis: str | None) -
     """True if the drafts of the maps of two files say the same, so that one map is right for both."""
     with suppress(InputError):
         drafts = [yaml.safe_load(map_text(draft_map(one, rate_hz, axis))) for one in (source, first)]
-        return bool(drafts[0] | {"about": ""} == drafts[1] | {"about": ""})
+        return _same(drafts[0] | {"about": ""}, drafts[1] | {"about": ""})
     return False
+
+
+def _same(one: object, other: object) -> bool:
+    """True of drafts whose numbers are the same within `_FOUND`: sizes of units are found with errors."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_same(value, other[key]) for key, value in one.items())
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return isclose(one, other, rel_tol=_FOUND)
+    return one == other
 
 
 def _is_whole(source: Path, rate_hz: float | None, axis: str | None) -> bool:

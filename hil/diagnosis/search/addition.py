@@ -14,7 +14,7 @@ from hil.diagnosis.acceptance import ADDED, HARMLESS, VALUES
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, Ledger, accepted, examine
 from hil.diagnosis.search.events import InsideWindows, inside_windows
-from hil.diagnosis.search.initial_values import claimable, possible, reads_wrong
+from hil.diagnosis.search.initial_values import claimable, is_rare, possible, reads_wrong
 from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.wording import channel_names
 from hil.identification.dataset import Dataset
@@ -118,6 +118,11 @@ class Addition:
     def possible(self) -> bool:
         """True if the term can be there: else it is not even an equal of another."""
         return possible(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
+
+    @cached_property
+    def rare(self) -> bool:
+        """True for a cause that is rarer than a like one."""
+        return is_rare(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
 
     @cached_property
     def conditions(self) -> Ledger:

@@ -239,6 +239,11 @@ def claimable(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
     return block_observed(term.effect, runs) and named(term.values, term.variant, axis_facts(bench, runs))
 
 
+def is_rare(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
+    """True for a cause that is rarer at its values than a like one."""
+    return BY_ID[term.effect].is_rare(term.values, axis_facts(bench, runs))
+
+
 def possible(term: Term, bench: Bench, runs: Sequence[Measured] = ()) -> bool:
     """True if a term can be there, though the name of its law may be another mechanism's."""
     can_be = BY_ID[term.effect].is_possible

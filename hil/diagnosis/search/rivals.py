@@ -127,10 +127,10 @@ def _ended(one: Addition, search: SearchRound) -> Addition:
 def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
+    A rare cause gives way. Of two mechanisms with the same torque on every motion the more frequent one is preferred.
     """
     near = [one for one in others if one.fit.jacobian.size and _evidence(best, one, bic_gain) < CRITERIA.tied]
-    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
+    return min([best, *near], key=lambda one: (one.rare, one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
 
 
 def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
@@ -148,7 +148,9 @@ def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
         and one.fit.hypothesis.free <= best.fit.hypothesis.free
         and not _refuted(_evidence(best, one, margin), one, best)
     ]
-    return min([best, *near], key=lambda one: (_parts(one), not reads_wrong(one.fit.terms[-1], one.fit.bench)))
+    return min(
+        [best, *near], key=lambda one: (one.rare, _parts(one), not reads_wrong(one.fit.terms[-1], one.fit.bench))
+    )
 
 
 def _parts(one: Addition) -> int:
@@ -200,6 +202,8 @@ def _behind(one: Addition, named: Addition) -> str:
     """Reason why an explanation with better evidence and no objection is not the named one."""
     if not one.claimable:
         return "a more frequent mechanism has the same law at these values"
+    if one.rare and not named.rare:
+        return "it is a rarer cause of the same"
     if _parts(one) > _parts(named):
         return "it acts on more parts of the axis"
     if one.fit.hypothesis.free > named.fit.hypothesis.free:

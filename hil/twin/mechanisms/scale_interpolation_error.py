@@ -62,5 +62,5 @@ MECHANISM = Mechanism(
     ),
     search=SearchHints(_starts, lambda a: (max(0.5 * (a.table_count_m or 1e-7), 1e-7), 20e-6, 0.0), needs_table=True),
     can_be=_valid,
-    is_another=_of_the_screw,
+    is_rare=_of_the_screw,
 )

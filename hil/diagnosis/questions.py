@@ -9,6 +9,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.moment_of_change import MomentOfChange, moment_of_change
 from hil.diagnosis.result import MOMENT
 from hil.identification.dataset import Dataset
+from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.periods import strongest_periods
 from hil.identification.plain_model import PlainModel, plain_columns
@@ -52,6 +53,9 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
     length = "rad" if hypothesis.bench.axis.turns else "m"
     up = [moved.velocity > 0.0 for moved in motions]
     by_direction = tuple(one - low + 1.001 * span * moves for one, moves in zip(position, up, strict=True))
+    since = [ratio * _since_reversal(moved) for moved in motions]
+    farthest = 1.001 * max(float(one.max()) for one in since)
+    by_reversal = tuple(one + farthest * moves for one, moves in zip(since, up, strict=True))
     load = [plain.predict(moved) for moved in motions]
     least = min(float(one.min()) for one in load)
     range_ = 1.001 * (max(float(one.max()) for one in load) - least)
@@ -59,10 +63,22 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
     return [
         Question(POSITION, length, length, position),
         Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
+        # contacts, seals and cables that are dragged along yield first
+        Question("distance from the last reversal", length, length, by_reversal, 2 * BINS, farthest),
         Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
         # friction of a load has its sign
         Question("load", hypothesis.bench.axis.drive_unit, length, by_load, 2 * BINS, range_, least),
     ]
+
+
+def _since_reversal(moved: MeasuredMotion) -> FloatArray:
+    """Distance (n,) from where the motion last turned, or from the first row [motor units]."""
+    way = moved.direction
+    moving = np.flatnonzero(way)
+    turns = moving[1:][way[moving[1:]] != way[moving[:-1]]]  # first row of each way but the first
+    begins = np.concatenate([[0], turns])
+    last = begins[np.searchsorted(begins, np.arange(way.size), side="right") - 1]
+    return np.asarray(np.abs(moved.position - moved.position[last]))
 
 
 def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:

@@ -105,10 +105,11 @@ class Hypothesis:
 
     @property
     def given(self) -> "Hypothesis":
-        """The hypothesis with the nominal parameters as the bench file gives them; a delay of the torque, which is of
-        the recording, stays.
+        """The hypothesis with the nominal parameters as the bench file gives them; a delay of the torque that it does
+        not give stays.
         """
-        from_file = np.array([name != DELAY for name in self.nominal] + [False] * (self.x.size - self.nominal_count))
+        told = [name != DELAY or bool(self.bench.torque_delay_s) for name in self.nominal]
+        from_file = np.array(told + [False] * (self.x.size - self.nominal_count))
         return self.moved(np.where(from_file, self._initial, self.x))
 
     # --- parameters ---

@@ -97,7 +97,7 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     order = ordered([best, *(one for one in others if one.possible)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
     standing = [one for one in order if one is not best and one.claimable and not objection(one, best)]
-    named = _on_fewest_parts(_simplest(best, standing), [best, *standing])
+    named = _on_fewest_parts(_simplest(_frequent(best, standing), standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
     considered = [one.considered for one in others if not one.possible]
@@ -124,10 +124,17 @@ def _ended(one: Addition, search: SearchRound) -> Addition:
     return one if fit is one.fit else search.addition(fit)
 
 
+def _frequent(best: Addition, others: Sequence[Addition]) -> Addition:
+    """Return the first that is not refuted and is no rare cause, where the best is one."""
+    margin = partial(bic_margin, filters=whitening(best.fit))
+    near = (one for one in others if not one.rare and one.fit.jacobian.size)
+    return next((one for one in near if best.rare and not _refuted(_evidence(best, one, margin), one, best)), best)
+
+
 def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     """Return the explanation with the fewest parameters of those that the evidence does not separate.
 
-    A rare cause gives way. Of two mechanisms with the same torque on every motion the more frequent one is preferred.
+    Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
     near = [one for one in others if one.fit.jacobian.size and _evidence(best, one, bic_gain) < CRITERIA.tied]
     return min([best, *near], key=lambda one: (one.rare, one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))

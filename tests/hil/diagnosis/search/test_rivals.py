@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnosis_runs import bench, dataset, fitted, recorded
+from diagnosis_runs import SEGMENTS, bench, dataset, fitted, moves, recorded
 
 from hil.channels import AxisKind
 from hil.diagnosis.search import addition, rivals
@@ -56,6 +56,23 @@ def test_what_explains_more_is_named_unless_there_is_an_objection(monkeypatch: p
     choice = chosen(wrong, [search.addition(fits[0]), wrong], search)
     assert choice.rivals == []
     assert [(one.rule, one.accepted) for one in choice.considered[0].ledger] == [("values", False)]
+
+
+@pytest.mark.parametrize(("fast", "named"), [(True, "scale_interpolation_error"), (False, "periodic_lead_error")])
+def test_a_rare_cause_gives_way_unless_the_recordings_tell_it(fast: bool, named: str) -> None:
+    """A scale with the period of the lead, by motion in which an error of the screw takes torque or none."""
+    scale = Term("scale_interpolation_error", 0, (3e-6, OWNER.axis.lead_m, 0.3))
+    screw = Term("periodic_lead_error", 0, (3e-6, 0.3, 0.0, 0.0, 0.0, 0.0))
+    slow = [{"kind": "sine_squared", "to_m": to_m, "feed_m_s": 0.01} for to_m in (0.03, 0.0)]
+    data = dataset([take(recorded(OWNER, scale, profile=moves(SEGMENTS if fast else slow)), OWNER)], OWNER)
+    base = fitted(Hypothesis(OWNER), data, evaluations=4)
+    search = SearchRound(base, base, base)
+    right, other = (search.addition(fitted(Hypothesis(OWNER, (one,)), data, evaluations=12)) for one in (scale, screw))
+    assert (right.rare, other.rare) == (True, False)
+    choice = chosen(right, [right, other], search)
+    assert choice.named.fit.terms[-1].effect == named
+    (rival,) = choice.rivals
+    assert rival.tied is not fast
 
 
 def explained(cost: float, motor: float, table: float) -> Any:

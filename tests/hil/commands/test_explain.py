@@ -101,6 +101,21 @@ def test_files_of_one_name_and_other_units_have_a_map_each(tmp_path: Path) -> No
     }
 
 
+def test_files_whose_sizes_are_found_with_errors_share_a_map(tmp_path: Path) -> None:
+    """Counts per revolution are found by a speed beside them: 3977 in both files, within the noise of the speed."""
+    columns, names = axis(5000), []
+    for part in (slice(0, 2500), slice(2500, 5000)):
+        noisy = columns["speed"][part] * 60.0 / (2.0 * np.pi) * (1.0 + 1e-4 * (part.start > 0))
+        counts = np.round(columns["angle"][part] / (2.0 * np.pi / 3977.0))
+        rows = np.column_stack([columns["t"][part], counts, noisy, columns["torque"][part]])
+        names.append(f"part_{part.start}.csv")
+        header = "time [s],pos [inc],speed [rpm],torque [Nm]"
+        np.savetxt(tmp_path / names[-1], rows, delimiter=",", header=header, comments="", fmt="%.9g")
+    hil(tmp_path, "explain", *names, "--budget", "1")
+    (found,) = (tmp_path / "explained-part_0").glob("*-map.yaml")
+    assert "counts_per_rev: " in found.read_text()
+
+
 def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path: Path) -> None:
     """The torque in tenths of something: inertia and friction are ten times the true ones, and it is told."""
     written(tmp_path, "", 10.0)

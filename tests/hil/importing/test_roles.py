@@ -51,11 +51,12 @@ def test_a_speed_by_its_letter_is_no_position_where_it_explains_a_column_better(
 
 
 def test_a_named_speed_tells_that_a_coarse_column_without_a_name_is_its_position(tmp_path: Path) -> None:
-    """The speed explains the torque better than 200 counts of a turn, and is their derivative."""
-    steps = np.round(AXIS["angle"] / (2.0 * np.pi / 200.0))
-    columns = {"t_s": AXIS["t"], "q1": steps, "speed_rad_s": AXIS["speed"], "torque_Nm": AXIS["torque"]}
+    """The speed explains the torque better than 12 counts of a turn, and is their derivative."""
+    steps = np.round(AXIS["angle"] / (2.0 * np.pi / 12.0))
+    quiet = np.convolve(AXIS["speed"], np.ones(9) / 9.0, mode="same")
+    columns = {"t_s": AXIS["t"], "word_3": steps, "speed_rad_s": quiet, "torque_Nm": AXIS["torque"]}
     draft = draft_map(write(tmp_path / "log.csv", columns))
-    assert {one.channel: one.entry["column"] for one in draft.channels}["motor_position_rad"] == "q1"
+    assert {one.channel: one.entry["column"] for one in draft.channels}["motor_position_rad"] == "word_3"
 
 
 def test_a_position_without_a_word_beside_a_measured_one_is_a_set_point_if_it_explains_less(tmp_path: Path) -> None:

@@ -1,0 +1,59 @@
+"""Friction that the twin lacks has the sign of the motion: a structure of the torque over load or distance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import INERTIA_KG_M2, axis, write
+
+from hil.bench.bench_file import load_bench
+from hil.commands.identify import identify
+from hil.commands.import_ import import_
+from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.structure_left import TORQUE, Dependence, structure_left
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.recording.recording import read_recording
+
+COLUMNS = axis(24_000)
+WEIGHT_N_M, SHARE = 0.3, 0.1
+DRAG_N_M, PLAY_RAD, RAMP_RAD = 0.15, 12.0, 1.0
+
+
+def left_by(extra: np.ndarray, folder: Path) -> list[Dependence]:
+    """What an axis with more torque (n,) leaves beside its own draft, in torque."""
+    folder.mkdir()
+    table = {"time_s": COLUMNS["t"], "motor_angle_rad": COLUMNS["angle"], "torque_Nm": COLUMNS["torque"] + extra}
+    import_(write(folder / "log.csv", table), None, folder / "log.parquet", None, None)
+    identify([folder / "log.parquet"], folder / "axis.yaml")
+    prepared = prepare([read_recording(folder / "log.parquet")], [], load_bench(folder / "axis.yaml"))
+    left = structure_left(fit_nominal_parameters(prepared.train), prepared.held_out)
+    return [one for one in left if one.channel == TORQUE and one.question.name != "offset"]
+
+
+def test_friction_that_grows_with_the_load_is_seen(tmp_path: Path) -> None:
+    acceleration = np.gradient(COLUMNS["speed"], 1e-3)
+    acceleration = np.convolve(acceleration, np.ones(25) / 25.0, mode="same")
+    load = INERTIA_KG_M2 * acceleration + WEIGHT_N_M
+    assert left_by(WEIGHT_N_M + 0.0 * load, tmp_path / "without") == []
+    friction = SHARE * np.abs(load) * np.sign(COLUMNS["speed"])
+    assert "load" in {one.question.name for one in left_by(WEIGHT_N_M + friction, tmp_path / "with")}
+
+
+def test_what_is_dragged_after_a_free_play_is_seen_from_the_reversal_on(tmp_path: Path) -> None:
+    """A cover that the axis carries along from the end of a play: it stays behind after each reversal."""
+    cover, drag = COLUMNS["angle"][0], []
+    for angle in COLUMNS["angle"]:
+        apart = float(np.clip(angle - cover, -PLAY_RAD - RAMP_RAD, PLAY_RAD + RAMP_RAD))
+        cover = angle - apart
+        drag.append(np.sign(apart) * max(abs(apart) - PLAY_RAD, 0.0) / RAMP_RAD)
+    found = {one.question.name: one for one in left_by(DRAG_N_M * np.array(drag), tmp_path / "drag")}
+    seen = found["distance from the last reversal"]
+    forwards = slice(int(np.searchsorted(seen.found.edges, seen.question.by_direction)) + 1, None)
+    starts = seen.found.edges[forwards][:-1] - seen.question.by_direction
+    free, taut = (
+        seen.found.means[forwards][starts < PLAY_RAD],
+        seen.found.means[forwards][starts > 2.0 * PLAY_RAD + RAMP_RAD],
+    )
+    assert np.mean(free) < 0.0 < np.mean(taut)

@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from hil.drafting.drafted_bench import DraftedBench
 
 BENCH, REPORT, PAGE = "bench.yaml", "report", "report.html"  # within the folder of an explanation
-_FOUND = 1e-3  # relative error of the size of a unit that is found by a relation of two columns
+# Sizes that are found by a relation of two columns, and their relative error: what files state differs by more.
+_FOUND_SIZES, _SIZE_ERROR = ("counts_per_rev", "counts_per_m", "scale"), 2e-4
 _DRAFTED_WITH = "# Drafted with: "  # options, at the end of a map
 OUTDATED = (
     "THE MAP OR THE DATA CHANGED since it was drafted. It was edited, so it is kept, with values of the former map; "
@@ -185,11 +186,14 @@ def _alike(source: Path, first: Path, rate_hz: float | None, axis: str | None) -
 
 
 def _same(one: object, other: object) -> bool:
-    """True of drafts whose numbers are the same within `_FOUND`: sizes of units are found with errors."""
+    """True of drafts that are the same but for the errors with which the sizes of counts and units are found."""
     if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(_same(value, other[key]) for key, value in one.items())
-    if isinstance(one, int | float) and isinstance(other, int | float):
-        return isclose(one, other, rel_tol=_FOUND)
+        return one.keys() == other.keys() and all(
+            isclose(value, other[key], rel_tol=_SIZE_ERROR)
+            if key in _FOUND_SIZES and isinstance(value, int | float) and isinstance(other[key], int | float)
+            else _same(value, other[key])
+            for key, value in one.items()
+        )
     return one == other
 
 

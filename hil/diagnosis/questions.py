@@ -63,7 +63,7 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
     return [
         Question(POSITION, length, length, position),
         Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
-        # contacts, seals and cables that are dragged along yield first
+        # presliding contacts, covers and cables that are dragged along
         Question("distance from the last reversal", length, length, by_reversal, 2 * BINS, farthest),
         Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
         # friction of a load has its sign

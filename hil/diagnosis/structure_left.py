@@ -199,8 +199,11 @@ def _dependences(
             constant.energy / least_energy(fit.data, channel, plain),
             gain,
         )
-    asked = everywhere(fit.hypothesis, fit.data, plain)
-    there_too = everywhere(fit.hypothesis, held_out, plain) if others else []
+    # of all runs at once, so that a value by direction means the same in each
+    all_runs = everywhere(fit.hypothesis, fit.data.over((*fit.data.runs, *held_out.runs)), plain)
+    number = len(fit.data.runs)
+    asked = [replace(one, values=one.values[:number]) for one in all_runs]
+    there_too = [replace(one, values=one.values[number:]) for one in all_runs] if others else []
     if line := strongest_line(fit.data, parts, asked):
         physics, ratio = fit.bench.axis.physics(), fit.bench.axis.ratio_m_rad
         turn = 2.0 * np.pi * ratio / physics.angle_per_unit if physics.turn_known else 0.0

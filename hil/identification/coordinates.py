@@ -23,10 +23,9 @@ TRUST = 3.0
 # Friction that a bench file gives as 0 is not known: scale, step of the forward difference over it, and largest value,
 # in the unit of the parameter.
 LITTLE, LITTLE_STEP, ANY = 1e-3, 1e-2, 1e6
-# Delay of a recorded torque whose rows are not the ticks of the drive, in rows. A mean over the tick before or after a
-# row, or a sample of it, shifts it by up to a row and a half; the filter of the drive's current by what the plain model
-# tells. One that the bench file gives is told by plain least squares, which noise in the loop does not bend.
-DELAY, MOST_DELAY, MOST_OF_GIVEN = "torque_delay_s", 1.5, 0.5
+# Delay of a recorded torque whose rows are not the ticks of the drive. A mean over the tick before or after a row, or
+# a sample of it, shifts it by up to a row and a half; the filter of the drive's current by what the plain model tells.
+DELAY, MOST_DELAY = "torque_delay_s", 1.5
 
 
 class MotionRange(NamedTuple):
@@ -103,8 +102,8 @@ def axis_coordinate(name: str, value: float) -> Coordinate:
 
 
 def delay_coordinate(delay_s: float, period_s: float) -> Coordinate:
-    """The coordinate of the delay of a recorded torque; 0: none is given."""
-    most_s = MOST_OF_GIVEN * period_s if delay_s else MOST_DELAY * period_s + 0.5 * SMOOTH_S
+    """The coordinate of the delay of a recorded torque."""
+    most_s = MOST_DELAY * period_s + 0.5 * SMOOTH_S
     return Coordinate(DELAY, period_s, False, delay_s - most_s, delay_s + most_s, least_step=1e-3)
 
 

@@ -105,8 +105,8 @@ class Hypothesis:
 
     @property
     def given(self) -> "Hypothesis":
-        """The hypothesis with the nominal parameters as the bench file gives them; a delay of the torque that it does
-        not give stays.
+        """The hypothesis with the nominal parameters as the bench file gives them; a delay of the torque that it leaves
+        open keeps its fitted value.
         """
         told = [name != DELAY or bool(self.bench.torque_delay_s) for name in self.nominal]
         from_file = np.array(told + [False] * (self.x.size - self.nominal_count))

@@ -27,7 +27,7 @@ from hil.importing.stated import Stated
 from hil.importing.text_lines import shown
 from hil.importing.text_rows import Cell, read_rows
 from hil.importing.unit_lines import described, told_units
-from hil.importing.units import factor_and_unit
+from hil.importing.units import factor_and_unit, unit_named
 from hil.importing.variables import load_variables
 from hil.recording.arrow_files import is_number, numbers, parquet_schema, read_parquet, stored_unit, stored_values
 
@@ -227,8 +227,10 @@ def _with_stated(table: ForeignTable, stated: Stated) -> ForeignTable:
     """The table with the units, as 0.001 deg, and constants that its file states; a unit of a column counts first."""
     units, scales = stated.units_of(table.columns) | table.units, dict(table.scales)
     for name, (factor, unit) in {name: found for name in units if (found := factor_and_unit(units[name]))}.items():
-        units[name], scales[name] = unit, (factor, 0.0)
-    constants = stated.constants((), table.columns, units)
+        if factor and unit_named(unit) != "V":  # 10 V is a range
+            units[name], scales[name] = unit, (factor, 0.0)
+    columns = {name: scales.get(name, (1.0, 0.0))[0] * values for name, values in table.columns.items()}
+    constants = stated.constants((), columns, units)
     return replace(table, units=units, scales=scales, scalars=stated.numbers, constants=constants)
 
 

@@ -14,7 +14,7 @@ from hil.importing.effort_roles import EXPLAINED, better_speed, choose_efforts
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.monitor_outputs import monitor_outputs
 from hil.importing.one_axis import one_axis
-from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, driven, proportional
+from hil.importing.relations import IS_DERIVATIVE, SAME_POSITION, derivative_of, driven, lateness_s, proportional
 from hil.importing.row_counters import COUNTER, rises_evenly
 from hil.importing.two_encoders import follows_steps, motors_encoder, named_encoders
 from hil.importing.unnamed_columns import quantities_by_relations
@@ -166,12 +166,16 @@ def _positions(
     if efforts and not commands and len(measured) > 1:
         encoders = named_encoders(measured, labels)
         told = [name for name in measured if labels[name].motor or labels[name].table or labels[name].measured]
+        named = encoders | {name for name in measured if labels[name].motor or labels[name].table}
         plain = [name for name in measured if name not in (*told, *encoders) and not _turns(name, measured, labels)]
         commands, why = computed_one({name: live[name] for name in measured}, plain)
-        if not commands and len(measured) == 2 and plain and not encoders:
+        if not commands and len(measured) == 2 and plain and not named:
             driving = [live[name] for name in efforts]
             commands, why = unanswered_one({name: live[name] for name in measured}, driving, period_s)
             commands = [name for name in commands if name in plain]  # an encoder is none
+            if commands and told:  # a load behind a spring explains the torque worse too, and does not come before
+                late_s = lateness_s(live[commands[0]], motion(live[told[0]], period_s))
+                commands = commands if late_s < -period_s else []
         roles.unsure += [f"{name}: taken for the set-point, because {why}" for name in commands]
         measured = [name for name in measured if name not in commands]
     if not measured:

@@ -82,6 +82,8 @@ def factor_and_unit(text: str) -> tuple[float, str] | None:
     if not match or unit_named(text.strip(" []()")) is not None or unit_named(match["unit"]) is None:
         return None
     value = float((match["value"] or match["part"]).replace(",", "."))
+    if not value and match["part"]:
+        return None
     return (value if match["value"] else 1.0 / value), match["unit"]
 
 

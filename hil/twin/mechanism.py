@@ -159,7 +159,7 @@ class Mechanism:
     can_be: Callable[[Sequence[float], int, AxisFacts], bool] | None = None  # values, variant, axis
     # (values, axis) -> the law is another mechanism's there, a more frequent cause: its equal, and no name
     is_another: Callable[[Sequence[float], AxisFacts], bool] | None = None
-    # (values, axis) -> a rarer cause there than a like one, which is named unless the recordings tell them apart
+    # (values, axis) -> a rare cause there: another one is named unless the recordings tell them apart
     is_rare: Callable[[Sequence[float], AxisFacts], bool] = lambda values, axis: False
     # (values, axis) -> id and values of the mechanism that it is where it is no name; without: none
     beyond: Callable[[Sequence[float], AxisFacts], tuple[str, tuple[float, ...]]] | None = None

@@ -97,7 +97,7 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     order = ordered([best, *(one for one in others if one.possible)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
     standing = [one for one in order if one is not best and one.claimable and not objection(one, best)]
-    named = _on_fewest_parts(_simplest(_frequent(best, standing), standing), [best, *standing])
+    named = _on_fewest_parts(_simplest(_unless_rare(best, standing), standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
     considered = [one.considered for one in others if not one.possible]
@@ -124,11 +124,13 @@ def _ended(one: Addition, search: SearchRound) -> Addition:
     return one if fit is one.fit else search.addition(fit)
 
 
-def _frequent(best: Addition, others: Sequence[Addition]) -> Addition:
-    """Return the first that is not refuted and is no rare cause, where the best is one."""
+def _unless_rare(best: Addition, others: Sequence[Addition]) -> Addition:
+    """Return the best; for a rare cause the first other one that is not refuted, if there is one."""
+    if not best.rare:
+        return best
     margin = partial(bic_margin, filters=whitening(best.fit))
     near = (one for one in others if not one.rare and one.fit.jacobian.size)
-    return next((one for one in near if best.rare and not _refuted(_evidence(best, one, margin), one, best)), best)
+    return next((one for one in near if not _refuted(_evidence(best, one, margin), one, best)), best)
 
 
 def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:

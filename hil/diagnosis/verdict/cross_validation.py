@@ -75,6 +75,11 @@ class Ablation:
         return refusal(self.ledger)
 
     @property
+    def against_torque(self) -> bool:
+        """True if the torque refutes the term: another variant may leave it as it is."""
+        return any(answer.rule == "torque" and not answer.accepted for answer in self.ledger)
+
+    @property
     def shown(self) -> bool:
         """True if held-out recordings support the term."""
         return self.gain is not None and self.gain > CRITERIA.tied
@@ -96,8 +101,9 @@ class CrossValidation:
 def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals | None = None) -> CrossValidation:
     """Ablate every term; drop those that held-out recordings or laps refute, the most harmful first.
 
-    The strongest rival that the training recordings do not tell from a dropped term takes its place, or another variant
-    of the same mechanism, and is tested in turn. So does one that predicts the torque of held-out motion better.
+    The strongest rival that the training recordings do not tell from a dropped term takes its place; without one, and
+    where the torque refutes the term, another variant of its mechanism. It is tested in turn. So is a rival that
+    predicts the torque of held-out motion better.
     """
     dropped: list[Ablation] = []
     known = dict(rivals or {})
@@ -116,15 +122,16 @@ def cross_validate(nominal: Fit, final: Fit, held_out: Dataset, rivals: Rivals |
         fit, rest = final, worst.without
         final = claimed(rest.refit(30)) if rest.terms else rest
         others = known.pop(worst.term.key, ())
-        tried = {one.term.key for one in dropped}
         for index, rival in enumerate(others):
             if rival.tied and (other := _instead(fit, worst.term, rival.terms[-1], final)):
                 final = other
                 known[final.terms[-1].key] = [one.beside(rival) for one in others[index + 1 :]]
                 break
         else:
-            forms = [one for one in other_variants(worst.term, fit.bench) if one.key not in tried]
-            final = next((other for one in forms if (other := _instead(fit, worst.term, one, final))), final)
+            tried = [(one.term.effect, one.term.variant) for one in dropped]
+            forms = other_variants(worst.term, fit.bench) if worst.against_torque else []
+            starts = [one for one in forms if (one.effect, one.variant) not in tried]
+            final = next((other for one in starts if (other := _instead(fit, worst.term, one, final))), final)
 
 
 def _better_equal(

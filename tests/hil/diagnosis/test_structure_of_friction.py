@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 from foreign_axis import INERTIA_KG_M2, axis, write
 
 from hil.bench.bench_file import load_bench

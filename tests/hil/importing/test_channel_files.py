@@ -139,9 +139,15 @@ def test_a_number_before_the_unit_of_an_attribute_is_a_factor(tmp_path: Path) ->
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:
         file.attrs["sample_rate_Hz"] = 1000.0
-        for name, values, unit in (("s_act", np.degrees(ANGLE) / 1e-3, "0.001 deg"), ("i_q", TORQUE, "Nm")):
+        rated = np.full(ANGLE.size, 80.0)
+        for name, values, unit in (
+            ("s_act", np.degrees(ANGLE) / 1e-3, "0.001 deg"),
+            ("torque", TORQUE / 0.08, "%"),
+            ("rated_torque", rated, "0.1 Nm"),
+        ):
             file.create_dataset(name, data=values).attrs["unit"] = unit
     np.testing.assert_allclose(imported(path)["motor_position_rad"], ANGLE, atol=1e-9)
+    np.testing.assert_allclose(imported(path)["torque_n_m"], TORQUE, atol=1e-9)
 
 
 def test_an_attribute_that_groups_give_with_different_values_is_none(tmp_path: Path) -> None:

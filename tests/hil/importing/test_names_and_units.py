@@ -73,6 +73,7 @@ def test_counts_of_a_length_are_a_factor_and_its_unit() -> None:
     assert factor_and_unit("0.25um cts") == (0.25, "um")
     assert factor_and_unit("0,1 mdeg/count") == (0.1, "mdeg")
     assert factor_and_unit("0.1 mm/s") == (0.1, "mm/s")
+    assert factor_and_unit("1/0 rad") is None
     assert unit_named("deg per s") == "deg/s"
     assert unit_named("percent") == "%"
 

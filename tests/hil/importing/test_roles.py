@@ -59,14 +59,17 @@ def test_a_named_speed_tells_that_a_coarse_column_without_a_name_is_its_position
     assert {one.channel: one.entry["column"] for one in draft.channels}["motor_position_rad"] == "word_3"
 
 
-def test_a_position_without_a_word_beside_a_measured_one_is_a_set_point_if_it_explains_less(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("lead_s", "channel"), [(0.004, "position_command_m"), (-0.004, "table_position_m")])
+def test_a_position_without_a_word_beside_a_measured_one_is_a_set_point_if_it_comes_before(
+    tmp_path: Path, lead_s: float, channel: str
+) -> None:
+    """Both explain the torque worse than the motor's: a load that lags is a second encoder."""
     count = 2 * np.pi / 8192
-    late = np.round(np.interp(AXIS["t"] + 0.004, AXIS["t"], AXIS["angle"]) / count)
-    columns = {"t_s": AXIS["t"], "lim_pos_cnt": late, "act_pos_cnt": np.round(AXIS["angle"] / count)}
+    other = np.round(np.interp(AXIS["t"] + lead_s, AXIS["t"], AXIS["angle"]) / count)
+    columns = {"t_s": AXIS["t"], "lim_pos_cnt": other, "act_pos_cnt": np.round(AXIS["angle"] / count)}
     draft = draft_map(write(tmp_path / "log.csv", {**columns, "torque_Nm": AXIS["torque"]}))
     found = {one.channel: one.entry["column"] for one in draft.channels}
-    assert (found["motor_position_rad"], found["position_command_m"]) == ("act_pos_cnt", "lim_pos_cnt")
-    assert "table_position_m" not in found
+    assert (found["motor_position_rad"], found[channel]) == ("act_pos_cnt", "lim_pos_cnt")
 
 
 def test_row_numbers_are_no_torque_where_one_is_named(tmp_path: Path) -> None:

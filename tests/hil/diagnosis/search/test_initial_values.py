@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from geared_axis import geared
 
 from hil.bench.bench_file import MechanismEntry, load_bench
 from hil.diagnosis.search.facts import axis_facts
-from hil.diagnosis.search.initial_values import claimable, likenesses, observable, possible
+from hil.diagnosis.search.initial_values import claimable, is_rare, likenesses, observable, possible
 from hil.diagnosis.search.score_test import offered
 from hil.identification.dataset import Dataset
 from hil.identification.hypothesis import Hypothesis
@@ -107,9 +106,6 @@ def test_a_wave_longer_than_the_travel_has_no_name(train: Dataset, term: Term, s
 @pytest.mark.parametrize(
     ("term", "stands"),
     [
-        (Term("scale_interpolation_error", 0, (2e-6, 2.7e-3, 0.0)), True),
-        (Term("scale_interpolation_error", 0, (2e-6, OWNER.axis.lead_m, 0.0)), False),  # an error of the screw
-        (Term("scale_interpolation_error", 0, (2e-6, 0.5 * OWNER.axis.lead_m, 0.0)), False),
         (Term("thermal_growth", 0, (5e-5, 20.0)), True),
         (Term("thermal_growth", 0, (5e-5, 1.0)), False),  # at once: another lead
         (Term("structural_mode", 0, (40.0, 0.05, 0.1)), True),
@@ -118,6 +114,13 @@ def test_a_wave_longer_than_the_travel_has_no_name(train: Dataset, term: Term, s
 )
 def test_values_that_belong_to_another_cause_have_no_name(train: Dataset, term: Term, stands: bool) -> None:
     assert claimable(term, OWNER, train.runs) is stands
+
+
+@pytest.mark.parametrize(("leads", "rare"), [(1.0, True), (0.5, True), (0.27, False)])
+def test_a_scale_with_the_period_of_the_lead_is_a_rare_cause(train: Dataset, leads: float, rare: bool) -> None:
+    term = Term("scale_interpolation_error", 0, (2e-6, leads * OWNER.axis.lead_m, 0.0))
+    assert claimable(term, OWNER, train.runs)
+    assert is_rare(term, OWNER, train.runs) is rare
 
 
 def test_once_per_revolution_is_not_told_by_part_of_one() -> None:
@@ -160,15 +163,6 @@ def test_a_spring_that_rests_out_of_reach_is_a_load(train: Dataset, rest_m: floa
     spring = Term("spring_load", 0, (20.0, rest_m))
     assert claimable(spring, OWNER, train.runs) is named
     assert possible(spring, OWNER, train.runs) is there
-
-
-@pytest.mark.parametrize(("of_lead", "named"), [(1.0, False), (0.5, False), (0.2, True)])
-def test_an_error_with_the_period_of_the_lead_is_one_of_the_screw(train: Dataset, of_lead: float, named: bool) -> None:
-    """A scale may have that period, so that it is an equal."""
-    lead_m = 2.0 * math.pi * OWNER.axis.ratio_m_rad
-    error = Term("scale_interpolation_error", 0, (5e-6, of_lead * lead_m, 0.0))
-    assert claimable(error, OWNER, train.runs) is named
-    assert possible(error, OWNER, train.runs)
 
 
 @pytest.mark.parametrize(

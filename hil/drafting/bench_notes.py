@@ -107,12 +107,10 @@ def _of_torque(
             f"motion one way tells Coulomb friction and load together, {plant.one_way.value:.3g} {noise_unit} "
             f"+-{plant.one_way.std_error:.2g}: record the way back"
         )
-    known = "; not in the bench" if plant.offset.significant else ", not distinguishable from 0"
-    sure = "; see mechanisms of the bench" if plant.offset_told else known
-    notes.append(
-        f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}: a load, or "
-        "friction that differs by direction"
-    )
+    cause = ": a load, or friction that differs by direction"
+    known = f"; not in the bench{cause}" if plant.offset.significant else ", not distinguishable from 0"
+    sure = f"; see mechanisms of the bench{cause}" if plant.offset_told else known
+    notes.append(f"constant {effort} {plant.offset.value:.3g} {noise_unit} +-{plant.offset.std_error:.2g}{sure}")
     if plant.gravity is not None:
         sure = "" if plant.gravity.significant else ", not distinguishable from 0"
         size = f"{plant.gravity.value:.3g} {noise_unit} +-{plant.gravity.std_error:.2g}"
@@ -121,5 +119,5 @@ def _of_torque(
             unsure.append("the load follows the sine of its angle, as gravity does; see mechanisms of the bench")
     if plant.spring is not None:
         rate = f"{plant.spring.value:.3g} {'N/m' if linear else 'N m/rad'} +-{plant.spring.std_error:.2g} at the motor"
-        notes.append(f"{effort} over the position (a spring) {rate}, not in the bench: hil diagnose names it")
+        notes.append(f"{effort} over the position (a spring) {rate}, not in the bench: hil diagnose tests it")
     notes.append(f"noise of {names.torque}: {noise_of(recording, names.torque):.3g} {noise_unit} rms")

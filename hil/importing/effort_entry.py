@@ -94,8 +94,9 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
             entry.notes.append(f"{column}: its constant is taken from the header of the file: {text}")
         else:
             screw = _screw("the N m at 100 %") if linear else ""
-            whole = "rated current" if told.electric else "rated force" if linear else "rated torque"
-            entry.asked["rated"] = f"is in {unit} of the {whole}; write the {si} at 100 % {_UNKNOWN}{screw}"
+            whole = "current" if told.electric else "force" if linear else "torque"
+            of = f"of the rated or the largest {whole}, as the drive has it"
+            entry.asked["rated"] = f"is in {unit} {of}; write the {si} at 100 % {_UNKNOWN}{screw}"
         return entry
     header = constants.get(Constant.FORCE if linear else Constant.TORQUE)
     if unit == "A" and header is not None:

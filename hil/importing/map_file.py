@@ -6,7 +6,7 @@ A map is a YAML file, such as the shipped `hil/maps/emps.yaml`.
 """
 
 from math import isclose, pi
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
@@ -72,7 +72,9 @@ class CsvOptions(_Strict):
     column_names: tuple[str, ...] | None = Field(default=None, description="names for a file without a header")
     encoding: str = Field(default="utf-8", description="of the text")
     series: SeriesColumns | None = Field(default=None, description="columns of rows of one value each")
-    only: dict[str, str] = Field(default={}, description="rows to take, of one joint: column -> its text in them")
+    only: dict[str, Annotated[str, Field(coerce_numbers_to_str=True)]] = Field(
+        default={}, description="rows to take, as of one joint or state: column -> its text in them"
+    )
 
 
 class TimeColumn(_Strict):

@@ -229,7 +229,7 @@ def _with_stated(table: ForeignTable, stated: Stated) -> ForeignTable:
     for name, (factor, unit) in {name: found for name in units if (found := factor_and_unit(units[name]))}.items():
         if factor and unit_named(unit) != "V":  # 10 V is a range
             units[name], scales[name] = unit, (factor, 0.0)
-    columns = {name: scales.get(name, (1.0, 0.0))[0] * values for name, values in table.columns.items()}
+    columns = table.columns | {name: scales[name][0] * one for name, one in table.columns.items() if name in scales}
     constants = stated.constants((), columns, units)
     return replace(table, units=units, scales=scales, scalars=stated.numbers, constants=constants)
 

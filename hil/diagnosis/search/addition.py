@@ -121,7 +121,7 @@ class Addition:
 
     @cached_property
     def rare(self) -> bool:
-        """True for a cause that is rarer than a like one."""
+        """True for a rare cause, see `is_rare`."""
         return is_rare(self.fit.terms[-1], self.fit.bench, self.fit.data.runs)
 
     @cached_property

@@ -21,6 +21,7 @@ _ROWS = 4.0  # per period of a line: less is an alias
 _MOST_PERIODS = 4000  # of a line over the travel
 _SEEN = 4.0  # bins of the position per period, from which they show it
 POSITION, SPEED, OFFSET = "position", "speed", "offset"
+LATENESS = "lateness"  # of the recorded torque: a coefficient that may change, as those of the plain model
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +94,24 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
 
 
 def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
-    """The moment from which a coefficient of the plain model is another one; None where the rows do not tell one."""
+    """The moment from which a coefficient of the plain model, or the lateness of the torque, is another one.
+
+    None where the rows do not tell one.
+    """
     turning = plain.load_ratio if "sine" in plain.fit.names else None  # an arc that tells gravity
-    columns = [plain_columns(measured_motion(run).moved, turning) for run in data.runs]
+    columns = [
+        {**plain_columns(moved, turning), LATENESS: _of_lateness(moved, plain, run.period_s)}
+        for run in data.runs
+        for moved in [measured_motion(run).moved]
+    ]
     found = moment_of_change(parts, columns, [run.time_s for run in data.runs])
     return Question(MOMENT, "s", "", (), change=found) if found else None
+
+
+def _of_lateness(moved: MeasuredMotion, plain: PlainModel, period_s: float) -> FloatArray:
+    """Torque (n,) that is recorded beyond that of a motion, for each second by which it is recorded late."""
+    every = {**plain_columns(moved, plain.load_ratio, spring=True), "coulomb": np.zeros(moved.velocity.size)}
+    return np.asarray(-np.gradient(plain.fit.predict(every), period_s))
 
 
 def strongest_line(

@@ -16,6 +16,7 @@ from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.moment_of_change import MomentOfChange
 from hil.diagnosis.questions import (
+    LATENESS,
     OFFSET,
     Question,
     at_a_moment,
@@ -42,6 +43,7 @@ _COEFFICIENTS = {
     "offset": ("the load", {}),
     "sine": ("the torque over the sine of the angle", {}),
     "cosine": ("the torque over the cosine of the angle", {}),
+    LATENESS: ("the delay of the recorded torque", dict.fromkeys(("N m", "N", "V"), "s")),
 }
 _RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that shows it
 

@@ -20,9 +20,10 @@ CHATTER_STEP = 0.03
 # Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
 # compensate for a wrong structure.
 TRUST = 3.0
-# Friction that a bench file gives as 0 is not known: scale, step of the forward difference over it, and largest value,
-# in the unit of the parameter.
-LITTLE, LITTLE_STEP, ANY = 1e-3, 1e-2, 1e6
+# Friction that a bench file gives as 0 is not known. Its scale goes with the inertia, so that a fit does not depend on
+# the unit of the torque: Coulomb friction that slows the axis by that many rad/s^2 or m/s^2, viscous friction that
+# slows it by that share per second. Step of the forward difference over it, and largest value in its unit.
+LITTLE, LITTLE_STEP, ANY = 0.1, 1e-2, 1e6
 # Delay of a recorded torque whose rows are not the ticks of the drive. A mean over the tick before or after a row, or
 # a sample of it, shifts it by up to a row and a half; the filter of the drive's current by what the plain model tells.
 DELAY, MOST_DELAY = "torque_delay_s", 1.5
@@ -92,13 +93,13 @@ class Coordinate:
         return min(step if self.edge else max(step, 1e-3), 0.1 * (self.high - self.low) / self.scale)
 
 
-def axis_coordinate(name: str, value: float) -> Coordinate:
-    """The coordinate of a nominal parameter of the axis with its value in the bench file."""
+def axis_coordinate(name: str, value: float, inertia: float) -> Coordinate:
+    """The coordinate of a nominal parameter of an axis, by its value in the bench file and the inertia at the motor."""
     if name in RATIOS:
         return Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, least_step=1e-3)
     if value > 0.0:
         return Coordinate(name, value, True, value / TRUST, value * TRUST)
-    return Coordinate(name, LITTLE, False, 0.0, ANY, least_step=LITTLE_STEP)  # friction that the bench leaves out
+    return Coordinate(name, LITTLE * inertia, False, 0.0, ANY, least_step=LITTLE_STEP)  # friction left out
 
 
 def delay_coordinate(delay_s: float, period_s: float) -> Coordinate:

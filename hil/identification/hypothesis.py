@@ -140,8 +140,8 @@ class Hypothesis:
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Coordinates of x."""
-        axis = self.bench.axis
-        coordinates = [axis_coordinate(name, float(getattr(axis, name))) for name in axis.NOMINAL]
+        axis, inertia = self.bench.axis, float(self.bench.axis.physics().chain.inertia_kg_m2.sum())
+        coordinates = [axis_coordinate(name, float(getattr(axis, name)), inertia) for name in axis.NOMINAL]
         if DELAY in self.nominal:
             coordinates.append(delay_coordinate(self.bench.torque_delay_s or 0.0, self.bench.period_s))
         coordinates += self._known

@@ -58,6 +58,23 @@ def test_the_sign_of_a_structure_is_that_of_the_torque_that_the_axis_needs(tmp_p
     assert any("the Coulomb friction is" in one and "larger than before" in one for one in told)
 
 
+@pytest.mark.parametrize(("rate", "than_before"), [(1.5e-4, "smaller"), (-1.5e-4, "larger")])
+def test_a_clock_of_the_torque_that_runs_fast_is_seen(tmp_path: Path, rate: float, than_before: str) -> None:
+    """The torque of a later moment stands in a row: by 4 ms more at the end than at the begin."""
+    rows = 3 * ROWS
+    columns = axis(rows)
+    t = columns["t"]
+    columns["torque"] = np.interp(t + rate * t, t, columns["torque"])
+    columns["torque"] += np.random.default_rng(5).normal(0.0, NOISE_N_M, rows)
+    path = write(tmp_path / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
+    import_(path, None, tmp_path / "log.parquet", None, None)
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    left = structure_left(fit_nominal_parameters(prepared.train), prepared.held_out)
+    told = [one.in_words("N m") for one in left if one.channel == TORQUE]
+    assert any("the delay of the recorded torque is" in one and f"{than_before} than before" in one for one in told)
+
+
 def test_a_weight_that_the_bench_has_not_may_change_at_a_moment(tmp_path: Path) -> None:
     """A weight throughout, and more of it and of the inertia from a moment on: its value in each part is told."""
     after = np.arange(ROWS) >= AT

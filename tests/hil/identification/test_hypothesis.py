@@ -72,3 +72,19 @@ def test_a_delay_of_the_torque_that_the_bench_file_does_not_give_is_of_the_recor
     assert given.pop("torque_delay_s") == pytest.approx(given_s or 0.2 * OWNER.period_s)
     assert given == pytest.approx({name: file[name] for name in given})
     assert fitted.given.terms == fitted.terms
+
+
+@pytest.mark.parametrize("times", [1e-2, 1e4])
+def test_friction_that_the_bench_leaves_out_has_a_step_in_every_unit_of_the_torque(times: float) -> None:
+    """Torque in per cent of the rated, or in N m: the friction of a step is that many times the other."""
+    without = OWNER.axis.model_copy(update={"coulomb_torque_n_m": 0.0, "viscous_torque_n_m_s_rad": 0.0})
+    masses = {name: times * getattr(without, name) for name in without.MASSES}
+
+    def steps(axis: object) -> list[float]:
+        start = Hypothesis(OWNER.model_copy(update={"axis": axis}))
+        sizes = zip(start.coordinates, start.steps(0.1, 4.0, LAST_EDGE_STEP_S), strict=True)
+        return [one.value(one.x(0.0) + step) for one, step in sizes if one.left_out]
+
+    two = steps(without)
+    assert len(two) == 2
+    assert steps(without.model_copy(update=masses)) == pytest.approx([times * one for one in two])

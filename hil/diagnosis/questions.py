@@ -11,7 +11,7 @@ from hil.diagnosis.result import MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.periods import strongest_periods
+from hil.identification.periods import refined_period, strongest_periods
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import BINS, ResidualSeries
 from hil.identification.torque_left import measured_motion
@@ -30,7 +30,8 @@ class Question:
 
     `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
     `by_direction` where the axis moves up. `choices`: number of quantities of which the residual itself chose this one.
-    `change`: asked is from which moment on a coefficient of the plain model is another one.
+    `period`: what the position is folded on, 0 for none. `change`: asked is from which moment on a coefficient of the
+    plain model is another one.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Question:
     by_direction: float = 0.0
     least: float = 0.0
     choices: int = 1
+    period: float = 0.0
     change: MomentOfChange | None = None
 
 
@@ -133,7 +135,7 @@ def strongest_line(
     shortest = max(_ROWS * run.period_s * float(np.median(np.abs(speed))), _ROWS * float(counts), span / _MOST_PERIODS)
     left = np.concatenate([part.left[part.rows] for part in parts])
     found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest=_SEEN * span / BINS)
-    return (found[0], int(2.0 * span / shortest)) if found else None
+    return (refined_period(position, left, found[0]), int(2.0 * span / shortest)) if found else None
 
 
 def folded(asked: Sequence[Question], line: tuple[float, int], turn: float) -> Question:
@@ -141,7 +143,8 @@ def folded(asked: Sequence[Question], line: tuple[float, int], turn: float) -> Q
     (period, choices), position = line, _named(asked, POSITION)
     often = f" ({digits(turn / period)} per motor turn)" if turn else ""
     name = f"place within its period of {quantity(period, position.length)}{often}"
-    return replace(position, name=name, values=tuple(np.mod(one, period) for one in position.values), choices=choices)
+    places = tuple(np.mod(one, period) for one in position.values)
+    return replace(position, name=name, values=places, choices=choices, period=period)
 
 
 def _named(asked: Sequence[Question], name: str) -> Question:

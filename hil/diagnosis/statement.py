@@ -181,6 +181,11 @@ def _together(left: TorqueLeft | None) -> str:
 
 
 def _depends(result: Result) -> str:
-    """The strongest structure that is left, and the moment from which the axis is another one; empty without any."""
+    """The strongest structure that is left, the moment from which the axis is another one, and what maps of it leave.
+
+    Empty without a structure.
+    """
     told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over == MOMENT]
-    return f" Structure is left: {'; '.join(told)}." if told else ""
+    left = [percent(one.held_out_after / one.held_out_before) for one in result.unnamed]
+    maps = f" A map in bench.diagnosed.yaml leaves {' and '.join(left)} of it (rms, held out)." if left else ""
+    return f" Structure is left: {'; '.join(told)}.{maps}" if told else ""

@@ -6,6 +6,7 @@ is that of the Lomb-Scargle periodogram with a free mean (M. Zechmeister, M. Kue
 """
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from hil.arrays import FloatArray
 from hil.identification.least_squares import least_squares
@@ -18,6 +19,20 @@ def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
     """Share of the energy of a signal (n,) that one harmonic of a phase (n,) [rad] explains."""
     columns = {"sine": np.sin(phase), "cosine": np.cos(phase), "one": np.ones_like(phase)}
     return least_squares(columns, signal, blocks=0).share
+
+
+def refined_period(position: FloatArray, signal: FloatArray, period: float) -> float:
+    """The period about one of `strongest_periods` at which a harmonic explains most of a signal (n,) over a position.
+
+    Sought within half the width of its peak in the spectrum.
+    """
+    width = 0.5 / float(np.ptp(position))
+
+    def left(frequency: float) -> float:
+        return 1.0 - harmonic_share(2.0 * np.pi * frequency * position, signal)
+
+    found = minimize_scalar(left, bounds=(max(1.0 / period - width, 0.5 / period), 1.0 / period + width))
+    return float(1.0 / found.x)
 
 
 def strongest_periods(

@@ -1,12 +1,15 @@
-"""Maps: terms for an effect that has no name, a line through six knots over one quantity, constant beyond.
+"""Maps: terms for an effect that has no name, a line through six knots over one quantity.
 
-They are no mechanisms of the library: a search never fits them, so that a map hides no named cause.
+It is constant beyond its ends, or repeats over the position, with its knots at equal steps of a period. Maps are no
+mechanisms of the library: a search never fits them, so that a map hides no named cause.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import numpy as np
 from numba import njit
 
+from hil.arrays import FloatArray
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
@@ -29,6 +32,17 @@ def _along(x: float, parameters: Row) -> float:
 
 
 @njit
+def _within(x: float, parameters: Row) -> float:
+    period = parameters[1] - parameters[0]
+    if period <= 0.0:
+        return parameters[2]
+    share = ((x - parameters[0]) / period) % 1.0 * 6.0
+    first = int(share)
+    low, high = parameters[2 + first % 6], parameters[2 + (first + 1) % 6]
+    return low + (share - first) * (high - low)
+
+
+@njit
 def _torque_over_position(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     line: float = _along(at.table_position_m, parameters)
     return value - line
@@ -43,6 +57,18 @@ def _torque_over_speed(value: float, at: Moment, parameters: Row, memory: Row) -
 @njit
 def _reading_over_position(value: float, at: Moment, parameters: Row, memory: Row) -> float:
     line: float = _along(at.table_position_m, parameters)
+    return value + line
+
+
+@njit
+def _torque_within_period(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    line: float = _within(at.table_position_m, parameters)
+    return value - line
+
+
+@njit
+def _reading_within_period(value: float, at: Moment, parameters: Row, memory: Row) -> float:
+    line: float = _within(at.table_position_m, parameters)
     return value + line
 
 
@@ -93,4 +119,30 @@ READING_OVER_POSITION = _map(
     "The second encoder reads more than the position of the table, depending on the position.",
     _parameters("position_m", Dimension.LENGTH, "m", Dimension.LENGTH),
 )
-MAPS = (TORQUE_OVER_POSITION, TORQUE_OVER_SPEED, READING_OVER_POSITION)
+TORQUE_WITHIN_PERIOD = _map(
+    "unnamed_torque_within_period",
+    Block.MOTOR_SIDE,
+    Stage.MOTOR_TORQUE,
+    _torque_within_period,
+    "The axis needs more torque that depends on the place within a period of the position.",
+    _parameters("position_m", Dimension.LENGTH, "n_m", Dimension.TORQUE),
+)
+READING_WITHIN_PERIOD = _map(
+    "unnamed_reading_within_period",
+    Block.SENSOR,
+    Stage.TABLE_READING,
+    _reading_within_period,
+    "The second encoder reads more than the position of the table, depending on the place within a period.",
+    _parameters("position_m", Dimension.LENGTH, "m", Dimension.LENGTH),
+)
+MAPS = (
+    TORQUE_OVER_POSITION, TORQUE_OVER_SPEED, READING_OVER_POSITION, TORQUE_WITHIN_PERIOD, READING_WITHIN_PERIOD
+)  # fmt: skip
+
+
+def knots(values: Sequence[float], period: float) -> tuple[FloatArray, FloatArray]:
+    """Places and heights of the knots of a map with its values; of one that repeats with a `period` over one period."""
+    heights = np.array(values[2:])
+    if not period:
+        return np.linspace(values[0], values[1], KNOTS), heights
+    return np.linspace(0.0, period, KNOTS + 1), np.append(heights, heights[0])

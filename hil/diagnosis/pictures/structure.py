@@ -12,6 +12,7 @@ from hil.diagnosis.structure_left import TORQUE, Dependence, coefficient
 from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, MEASURED, SIMULATED
 from hil.quantities import reading_unit
+from hil.twin.maps import knots
 
 if TYPE_CHECKING:
     from hil.diagnosis.diagnosis import Diagnosis
@@ -74,5 +75,5 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
 def _knots(axis: Axes, one: Dependence, values: tuple[float, ...], drive_unit: str) -> None:
     along, _, factor, _ = _units(one, drive_unit)
     middle = 0.5 * (one.found.edges[:-1] + one.found.edges[1:])
-    x = np.linspace(middle[0], middle[-1], len(values) - 2)
-    axis.plot(along * x, factor * np.array(values[2:]), color=SIMULATED, linewidth=2.0)
+    x, heights = knots((middle[0], middle[-1], *values[2:]), one.question.period)  # of speed: values are the motor's
+    axis.plot(along * x, factor * heights, color=SIMULATED, linewidth=2.0)

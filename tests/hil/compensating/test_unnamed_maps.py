@@ -21,6 +21,12 @@ OVER_SPEED = {"first_speed_rad_s": -60.0, "last_speed_rad_s": 60.0} | {
     ("effect", "parameters", "name", "over"),
     [
         ("unnamed_torque_over_position", OVER_POSITION, "torque over position", Over.POSITION),
+        (
+            "unnamed_torque_within_period",
+            OVER_POSITION | {"last_position_m": 0.05},
+            "torque over position",
+            Over.POSITION,
+        ),
         ("unnamed_torque_over_speed", OVER_SPEED, "friction and load", Over.VELOCITY),
     ],
 )

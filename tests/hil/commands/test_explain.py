@@ -149,7 +149,7 @@ def test_a_doubt_about_a_map_is_told_until_it_is_settled(tmp_path: Path) -> None
 
 
 def test_the_rate_of_a_first_run_is_read_from_the_map(tmp_path: Path) -> None:
-    """Neither stamps nor a unit of the torque: what is doubtful is told without the option, too."""
+    """The file has neither time stamps nor a unit of its torque; a second run, without the option, tells it too."""
     columns = axis(2500)
     rows = np.column_stack([columns["angle"], columns["torque"]])
     np.savetxt(tmp_path / "axis.csv", rows, delimiter=",", header="angle [rad],torque", comments="", fmt="%.9g")

@@ -1,10 +1,11 @@
-"""Moment from which a coefficient of the plain model is another one in what a twin leaves of the torque.
+"""Change of a coefficient of the plain model over time in what a twin leaves of the torque.
 
     y = A b + a d 1(t >= t1) + e,    t1 and a, a column of A, where the sum of squares of e is least
 
-y is the residual torque, A the columns of the plain model (inertia, friction, load, gravity). With the error s of the
-jackknife over blocks d / s is Student's t of as many blocks less one. Each column and each moment is one question more
-(G. C. Chow, Econometrica 28 (1960) 591, with an unknown moment).
+Or it changes at one rate, as the delay between two clocks does. y is the residual torque, A the columns of the plain
+model (inertia, friction, load, gravity). With the error s of the jackknife over blocks d / s is Student's t of as many
+blocks less one. Each column and each moment is one question more (G. C. Chow, Econometrica 28 (1960) 591, with an
+unknown moment).
 """
 
 from collections.abc import Sequence
@@ -38,10 +39,28 @@ class MomentOfChange(NamedTuple):
     course: Structure
 
 
-def moment_of_change(
+class SteadyChange(NamedTuple):
+    """Coefficient that changes at one rate per second, over how long [s], and its course as of a moment of change."""
+
+    coefficient: str
+    rate: float
+    duration_s: float
+    course: Structure
+
+
+class _InTurn(NamedTuple):
+    """Residual (n,), time (n,), columns (n, k) and their names of all runs in order of time."""
+
+    left: FloatArray
+    time_s: FloatArray
+    table: FloatArray
+    names: list[str]
+
+
+def _in_turn(
     parts: Sequence[ResidualSeries], columns: Sequence[Columns], times_s: Sequence[FloatArray]
-) -> MomentOfChange | None:
-    """Find the moment with most evidence in residuals, columns and times (n,) of runs; None where rows are few."""
+) -> _InTurn | None:
+    """The rows that count; None where they are few, or a column is zero."""
     counted = [run for run, part in enumerate(parts) if part.rows.any()]
     order = sorted(counted, key=lambda run: float(times_s[run][parts[run].rows][0]))
     if not order:
@@ -51,25 +70,48 @@ def moment_of_change(
     )
     names = list(columns[0])
     table = np.column_stack([np.concatenate([columns[run][name][parts[run].rows] for run in order]) for name in names])
-    scale = np.linalg.norm(table, axis=0)
-    if left.size < _STEPS * 2 or not scale.all():
+    return _InTurn(left, time_s, table, names) if left.size >= _STEPS * 2 and table.any(axis=0).all() else None
+
+
+def moment_of_change(
+    parts: Sequence[ResidualSeries], columns: Sequence[Columns], times_s: Sequence[FloatArray]
+) -> MomentOfChange | None:
+    """Find the moment with most evidence in residuals, columns and times (n,) of runs; None where rows are few."""
+    rows = _in_turn(parts, columns, times_s)
+    if rows is None:
         return None
-    edges = np.linspace(0, left.size, _STEPS + 1).astype(int)
-    at, step = _most_explained(table / scale, left, edges)
-    after = np.where(np.arange(left.size) >= edges[step], table[:, at], 0.0)
-    common = dict(zip(names, table.T, strict=True))
-    fit = least_squares({**common, "change": after}, left, blocks=_BLOCKS)
+    edges = np.linspace(0, rows.left.size, _STEPS + 1).astype(int)
+    at, step = _most_explained(rows.table / np.linalg.norm(rows.table, axis=0), rows.left, edges)
+    shape = (np.arange(rows.left.size) >= edges[step]).astype(float)
+    found = _changed(rows, at, shape, len(rows.names) * (_STEPS - 2 * _SHORTEST))
+    return MomentOfChange(rows.names[at], float(rows.time_s[edges[step]]), *found) if found else None
+
+
+def steady_change(
+    parts: Sequence[ResidualSeries], columns: Sequence[Columns], times_s: Sequence[FloatArray], name: str
+) -> SteadyChange | None:
+    """The rate at which a coefficient changes, with 1(t >= t1) replaced by t; None where rows are few."""
+    rows = _in_turn(parts, columns, times_s)
+    if rows is None:
+        return None
+    found = _changed(rows, rows.names.index(name), rows.time_s - float(np.mean(rows.time_s)), 1)
+    return SteadyChange(name, found[0], float(np.ptp(rows.time_s)), found[1]) if found else None
+
+
+def _changed(rows: _InTurn, at: int, shape: FloatArray, asked: int) -> tuple[float, Structure] | None:
+    """Size of a change of one coefficient with a shape (n,) over time, and its course; None where no error is known."""
+    table, moving = rows.table, rows.table[:, at] * shape
+    common = dict(zip(rows.names, table.T, strict=True))
+    fit = least_squares({**common, "change": moving}, rows.left, blocks=_BLOCKS)
     change = fit["change"]
     if not np.isfinite(change.std_error) or not change.std_error > 0.0:
         return None
     chance = 2.0 * float(student.sf(abs(change.value) / change.std_error, _BLOCKS - 1))
-    asked = len(names) * (_STEPS - 2 * _SHORTEST)
-    moved = change.value * after
+    moved = change.value * moving
     beside = moved - table @ np.linalg.lstsq(table, moved, rcond=None)[0]  # what the other columns do not take over
-    own = fit.residual + moved + fit[names[at]].value * table[:, at]
-    bins, means, errors = _course(table[:, at], own, time_s)
-    course = Structure(bins, means, errors, float(np.mean(beside**2)), min(asked * chance, 1.0))
-    return MomentOfChange(names[at], float(time_s[edges[step]]), change.value, course)
+    own = fit.residual + moved + fit[rows.names[at]].value * table[:, at]
+    bins, means, errors = _course(table[:, at], own, rows.time_s)
+    return change.value, Structure(bins, means, errors, float(np.mean(beside**2)), min(asked * chance, 1.0))
 
 
 def _most_explained(table: FloatArray, left: FloatArray, edges: NDArray[np.intp]) -> tuple[int, int]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
-from hil.diagnosis.moment_of_change import MomentOfChange, moment_of_change
-from hil.diagnosis.result import MOMENT
+from hil.diagnosis.moment_of_change import MomentOfChange, SteadyChange, moment_of_change, steady_change
+from hil.diagnosis.result import CLOCK, MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
@@ -31,7 +31,7 @@ class Question:
     `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
     `by_direction` where the axis moves up. `choices`: number of quantities of which the residual itself chose this one.
     `period`: what the position is folded on, 0 for none. `change`: asked is from which moment on a coefficient of the
-    plain model is another one.
+    plain model is another one; `steady`: at which rate it changes.
     """
 
     name: str
@@ -44,6 +44,7 @@ class Question:
     choices: int = 1
     period: float = 0.0
     change: MomentOfChange | None = None
+    steady: SteadyChange | None = None
 
 
 def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
@@ -95,10 +96,10 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
     return Question("time", "s", length, later, 2 * BINS, duration, begin)
 
 
-def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
-    """The moment from which a coefficient of the plain model, or the lateness of the torque, is another one.
+def changes_over_time(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
+    """How a coefficient of the plain model, or the delay of the torque, changes: at a moment, or that delay steadily.
 
-    None where the rows do not tell one.
+    The one that explains more; None where the rows tell none.
     """
     turning = plain.load_ratio if "sine" in plain.fit.names else None  # an arc that tells gravity
     columns = [
@@ -106,8 +107,11 @@ def at_a_moment(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainMode
         for run in data.runs
         for moved in [measured_motion(run).moved]
     ]
-    found = moment_of_change(parts, columns, [run.time_s for run in data.runs])
-    return Question(MOMENT, "s", "", (), change=found) if found else None
+    times_s = [run.time_s for run in data.runs]
+    moment, steady = moment_of_change(parts, columns, times_s), steady_change(parts, columns, times_s, LATENESS)
+    if steady and not (moment and moment.course.energy >= steady.course.energy):
+        return Question(CLOCK, "s", "", (), steady=steady)
+    return Question(MOMENT, "s", "", (), change=moment) if moment else None
 
 
 def _of_lateness(moved: MeasuredMotion, plain: PlainModel, period_s: float) -> FloatArray:

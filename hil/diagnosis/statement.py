@@ -7,7 +7,7 @@ from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
 from hil.diagnosis.ledger import EXPLAINS
 from hil.diagnosis.open_questions import cannot_show
-from hil.diagnosis.result import AT_FLOOR, MOMENT, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
+from hil.diagnosis.result import AT_FLOOR, CLOCK, MOMENT, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import listed, named, spoken, titles
 from hil.identification.coordinates import DELAY
@@ -185,7 +185,7 @@ def _depends(result: Result) -> str:
 
     Empty without a structure.
     """
-    told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over == MOMENT]
+    told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over in (MOMENT, CLOCK)]
     left = [percent(one.held_out_after / one.held_out_before) for one in result.unnamed]
     maps = f" A map in bench.diagnosed.yaml leaves {' and '.join(left)} of it (rms, held out)." if left else ""
     return f" Structure is left: {'; '.join(told)}.{maps}" if told else ""

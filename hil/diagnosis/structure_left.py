@@ -14,12 +14,12 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.moment_of_change import MomentOfChange
+from hil.diagnosis.moment_of_change import MomentOfChange, SteadyChange
 from hil.diagnosis.questions import (
     LATENESS,
     OFFSET,
     Question,
-    at_a_moment,
+    changes_over_time,
     everywhere,
     folded,
     over_time,
@@ -81,6 +81,8 @@ class Dependence:
         more = "more" if value > 0.0 else "less"
         if question.change:
             return f"{_changed(question.change, drive_unit)} ({by_chance(found.p)})"
+        if question.steady:
+            return f"{_apart(question.steady)} ({by_chance(found.p)})"
         if self.channel == TORQUE:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
         else:
@@ -108,7 +110,16 @@ def _changed(change: MomentOfChange, drive_unit: str) -> str:
     return f"from {change.moment_s:.2f} s on {name} is {size} {more} than before"
 
 
-def coefficient(change: MomentOfChange, drive_unit: str) -> tuple[str, str]:
+def _apart(steady: SteadyChange) -> str:
+    """Say that the delay of the torque changes steadily."""
+    way, late_s = "later" if steady.rate > 0.0 else "earlier", abs(steady.rate) * steady.duration_s
+    return (
+        f"the clocks of torque and position run apart by {digits(1e6 * abs(steady.rate))} ppm: at the end the torque "
+        f"is recorded {quantity(late_s, 's')} {way} than at the begin"
+    )
+
+
+def coefficient(change: MomentOfChange | SteadyChange, drive_unit: str) -> tuple[str, str]:
     """Name in words and unit of the coefficient that changes."""
     name, units = _COEFFICIENTS[change.coefficient]
     return name, units.get(drive_unit, drive_unit)
@@ -126,7 +137,9 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    asked = len(channels(fit.data)) * (len(everywhere(fit.hypothesis, fit.data, plain)) + 3)  # a line, time, a moment
+    asked = len(channels(fit.data)) * (
+        len(everywhere(fit.hypothesis, fit.data, plain)) + 4
+    )  # a line, time, a moment or a rate
     level = CRITERIA.significance / max(asked, 1)
     counted = [
         one
@@ -224,8 +237,10 @@ def _dependences(
     if found := structure(of_whole, question.values, question.bins):
         found = replace(found, p=max(found.p, slow(of_whole, question.values, found)))
         yield Dependence(channel, question, found, found.energy / all_of_it, found.energy / least, None)
-    if channel == TORQUE and one_way and (at := at_a_moment(whole, of_whole, plain)) and at.change:
-        found = at.change.course
+    if channel == TORQUE and one_way and (at := changes_over_time(whole, of_whole, plain)):
+        change = at.change or at.steady
+        assert change is not None
+        found = change.course
         yield Dependence(channel, at, found, min(found.energy / all_of_it, 1.0), found.energy / least, None)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hil.diagnosis.moment_of_change import moment_of_change
+from hil.diagnosis.moment_of_change import moment_of_change, steady_change
 from hil.identification.structure import ResidualSeries
 
 ROWS, PERIOD_S = 12000, 2e-3
@@ -75,6 +75,22 @@ def test_noise_changes_at_no_moment(seed: int, correlation_s: float) -> None:
         [ResidualSeries(coloured(seed, correlation_s), np.ones(ROWS, dtype=bool))], [COLUMNS], [TIME_S]
     )
     assert found is None or found.course.p > 1e-4
+
+
+@pytest.mark.parametrize("correlation_s", [0.01, 0.3])
+def test_a_rate_is_found_with_its_size_and_noise_has_none(correlation_s: float) -> None:
+    """The chance of twenty draws together is below a per cent at this level."""
+    rows = np.abs(COLUMNS["viscous"]) > 1.0
+    noise = [coloured(seed, correlation_s) for seed in range(20)]
+    found = [steady_change([ResidualSeries(one, rows)], [COLUMNS], [TIME_S], "viscous") for one in noise]
+    assert min(one.course.p for one in found if one) > 1e-4
+    rate = 2e-2
+    left = noise[0] + rate * (TIME_S - 3.0) * COLUMNS["viscous"]
+    steady = steady_change([ResidualSeries(left, rows)], [COLUMNS], [TIME_S], "viscous")
+    assert steady is not None
+    assert steady.rate == pytest.approx(rate, rel=0.2)
+    assert steady.course.p < 1e-4
+    assert steady.duration_s == pytest.approx(float(np.ptp(TIME_S[rows])))
 
 
 def test_few_rows_and_a_column_of_zeros_tell_nothing() -> None:

@@ -40,7 +40,7 @@ class MomentOfChange(NamedTuple):
 
 
 class SteadyChange(NamedTuple):
-    """Coefficient that changes at one rate per second, over how long [s], and its course as of a moment of change."""
+    """Coefficient that changes at one rate per second, over how long [s], and its course as in `MomentOfChange`."""
 
     coefficient: str
     rate: float

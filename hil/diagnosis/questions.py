@@ -99,7 +99,7 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
 def changes_over_time(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
     """How a coefficient of the plain model, or the delay of the torque, changes: at a moment, or that delay steadily.
 
-    The one that explains more; None where the rows tell none.
+    The one of less chance; None where the rows tell none.
     """
     turning = plain.load_ratio if "sine" in plain.fit.names else None  # an arc that tells gravity
     columns = [
@@ -109,7 +109,7 @@ def changes_over_time(data: Dataset, parts: Sequence[ResidualSeries], plain: Pla
     ]
     times_s = [run.time_s for run in data.runs]
     moment, steady = moment_of_change(parts, columns, times_s), steady_change(parts, columns, times_s, LATENESS)
-    if steady and not (moment and moment.course.energy >= steady.course.energy):
+    if steady and not (moment and moment.course.p <= steady.course.p):
         return Question(CLOCK, "s", "", (), steady=steady)
     return Question(MOMENT, "s", "", (), change=moment) if moment else None
 

@@ -108,7 +108,10 @@ def changes_over_time(data: Dataset, parts: Sequence[ResidualSeries], plain: Pla
         for moved in [measured_motion(run).moved]
     ]
     times_s = [run.time_s for run in data.runs]
-    moment, steady = moment_of_change(parts, columns, times_s), steady_change(parts, columns, times_s, LATENESS)
+    if not any(one[LATENESS][part.rows].any() for one, part in zip(columns, parts, strict=True)):  # one speed
+        columns = [{name: one[name] for name in one if name != LATENESS} for one in columns]
+    moment = moment_of_change(parts, columns, times_s)
+    steady = steady_change(parts, columns, times_s, LATENESS) if LATENESS in columns[0] else None
     if steady and not (moment and moment.course.p <= steady.course.p):
         return Question(CLOCK, "s", "", (), steady=steady)
     return Question(MOMENT, "s", "", (), change=moment) if moment else None
@@ -138,8 +141,10 @@ def strongest_line(
     counts = np.sqrt(12.0) * max(ratio * run.noise.motor, run.noise.table_m)
     shortest = max(_ROWS * run.period_s * float(np.median(np.abs(speed))), _ROWS * float(counts), span / _MOST_PERIODS)
     left = np.concatenate([part.left[part.rows] for part in parts])
-    found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest=_SEEN * span / BINS)
-    return (refined_period(position, left, found[0]), int(2.0 * span / shortest)) if found else None
+    longest = _SEEN * span / BINS
+    found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest)
+    choices = int(2.0 * span / shortest)
+    return (refined_period(position, left, found[0], shortest, longest), choices) if found else None
 
 
 def folded(asked: Sequence[Question], line: tuple[float, int], turn: float) -> Question:

@@ -186,6 +186,9 @@ def _depends(result: Result) -> str:
     Empty without a structure.
     """
     told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over in (MOMENT, CLOCK)]
-    left = [percent(one.held_out_after / one.held_out_before) for one in result.unnamed]
-    maps = f" A map in bench.diagnosed.yaml leaves {' and '.join(left)} of it (rms, held out)." if left else ""
+    maps = "".join(
+        f" On held-out motion a map of the {one.effect.removeprefix('unnamed_').replace('_', ' ')} leaves "
+        f"{percent(one.held_out_after / one.held_out_before)} of that residual (rms; bench.diagnosed.yaml has it)."
+        for one in result.unnamed
+    )
     return f" Structure is left: {'; '.join(told)}.{maps}" if told else ""

@@ -21,18 +21,23 @@ def harmonic_share(phase: FloatArray, signal: FloatArray) -> float:
     return least_squares(columns, signal, blocks=0).share
 
 
-def refined_period(position: FloatArray, signal: FloatArray, period: float) -> float:
+def refined_period(position: FloatArray, signal: FloatArray, period: float, shortest: float, longest: float) -> float:
     """The period about one of `strongest_periods` at which a harmonic explains most of a signal (n,) over a position.
 
-    Sought within half the width of its peak in the spectrum.
+    Sought within half the width of its peak in the spectrum, and between the shortest and the longest period. What
+    varies over more than the longest is taken off first.
     """
-    width = 0.5 / float(np.ptp(position))
+    span = float(np.ptp(position))
+    width = 0.5 / span
+    quick = signal - _slow(position, signal, longest) if longest < span else signal
 
     def left(frequency: float) -> float:
-        return 1.0 - harmonic_share(2.0 * np.pi * frequency * position, signal)
+        return 1.0 - harmonic_share(2.0 * np.pi * frequency * position, quick)
 
-    found = minimize_scalar(left, bounds=(max(1.0 / period - width, 0.5 / period), 1.0 / period + width))
-    return float(1.0 / found.x)
+    bounds = (max(1.0 / period - width, 1.0 / longest), min(1.0 / period + width, 1.0 / shortest))
+    if not bounds[0] < bounds[1]:
+        return period
+    return float(1.0 / minimize_scalar(left, bounds=bounds, options={"xatol": 1e-3 * width}).x)
 
 
 def strongest_periods(

@@ -97,9 +97,7 @@ def chosen(best: Addition, additions: Sequence[Addition], search: SearchRound) -
     order = ordered([best, *(one for one in others if one.possible)])
     best = first_standing([one for one in order if one.fit.jacobian.size]) or best
     standing = [one for one in order if one is not best and one.claimable and not objection(one, best)]
-    frequent = _unless_rare(best, standing)
-    level = [one for one in [best, *standing] if frequent.rare or not one.rare]
-    named = _on_fewest_parts(_simplest(frequent, level), level)
+    named = _on_fewest_parts(_simplest(_unless_rare(best, standing), standing), [best, *standing])
     filters = whitening(named.fit)
     compared = [(one, _compared(one, named, filters)) for one in order if one is not named]
     considered = [one.considered for one in others if not one.possible]
@@ -141,7 +139,7 @@ def _simplest(best: Addition, others: Sequence[Addition]) -> Addition:
     Of two mechanisms with the same torque on every motion the more frequent cause is preferred.
     """
     near = [one for one in others if one.fit.jacobian.size and _evidence(best, one, bic_gain) < CRITERIA.tied]
-    return min([best, *near], key=lambda one: (one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
+    return min([best, *near], key=lambda one: (one.rare, one.fit.hypothesis.free, not is_frequent(one.fit.terms[-1])))
 
 
 def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
@@ -159,7 +157,9 @@ def _on_fewest_parts(best: Addition, others: Sequence[Addition]) -> Addition:
         and one.fit.hypothesis.free <= best.fit.hypothesis.free
         and not _refuted(_evidence(best, one, margin), one, best)
     ]
-    return min([best, *near], key=lambda one: (_parts(one), not reads_wrong(one.fit.terms[-1], one.fit.bench)))
+    return min(
+        [best, *near], key=lambda one: (one.rare, _parts(one), not reads_wrong(one.fit.terms[-1], one.fit.bench))
+    )
 
 
 def _parts(one: Addition) -> int:

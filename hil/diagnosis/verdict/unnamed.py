@@ -50,7 +50,7 @@ class UnnamedTerm:
 def unnamed_terms(final: Fit, structure: tuple[Dependence, ...], held_out: Dataset) -> tuple[UnnamedTerm, ...]:
     """For each channel the map that removes most of what is left on held-out recordings; none where no map does."""
     mapped = [one for one in structure if _map_of(one)] if held_out.runs else []
-    tried = [_tested(final, one, held_out) for one in mapped]
+    tried = [one for one in (_tested(final, one, held_out) for one in mapped) if np.isfinite(one.before)]
     best = dict[str, UnnamedTerm]()
     for one in tried:
         known = best.get(one.dependence.channel)

@@ -78,6 +78,26 @@ def test_a_clock_of_the_torque_that_runs_fast_is_seen(tmp_path: Path, rate: floa
     assert f" {way} than at the begin" in clock.in_words("N m")
 
 
+def test_a_change_of_friction_is_seen_at_one_speed_too(tmp_path: Path) -> None:
+    """There the delay of the torque tells nothing and hides nothing; one speed does not tell which friction it is."""
+    t = 1e-3 * np.arange(2 * ROWS)
+    angle = 20.0 * np.abs(np.mod(t / 2.0, 2.0) - 1.0)
+    way = np.sign(np.gradient(angle, 1e-3))
+    torque = (COULOMB_N_M + 0.1 * (t >= 9.0)) * way + np.random.default_rng(5).normal(0.0, 0.01, t.size)
+    angle += np.random.default_rng(6).normal(0.0, 1e-4, t.size)
+    path = write(tmp_path / "log.csv", {"time_s": t, "motor_angle_rad": angle, "torque_Nm": torque})
+    import_(path, None, tmp_path / "log.parquet", None, None)
+    (tmp_path / "axis.yaml").write_text(
+        f"axis: {{model: rotary, gear_ratio: 1, inertia_kg_m2: 1e-3, coulomb_torque_n_m: {COULOMB_N_M}, "
+        "viscous_torque_n_m_s_rad: 1e-4}\ncontrol: {law: unknown}\n"
+        "encoders: {motor: {counts_per_rev: 65536}, table: null}\n"
+    )
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    left = structure_left(fit_nominal_parameters(prepared.train), prepared.held_out)
+    told = [one.in_words("N m") for one in left]
+    assert any("from 9.0" in one and "friction is" in one and "larger than before" in one for one in told)
+
+
 def test_a_weight_that_the_bench_has_not_may_change_at_a_moment(tmp_path: Path) -> None:
     """A weight throughout, and more of it and of the inertia from a moment on: its value in each part is told."""
     after = np.arange(ROWS) >= AT

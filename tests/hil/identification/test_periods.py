@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lombscargle
 
-from hil.identification.periods import harmonic_share, strongest_periods
+from hil.identification.periods import harmonic_share, refined_period, strongest_periods
 
 
 @given(st.floats(0.011, 0.2), st.floats(-3.0, 3.0), st.floats(-5.0, 5.0), st.integers(0, 1000))
@@ -26,6 +26,24 @@ def test_lines_come_by_strength_within_the_limits() -> None:
     signal = np.sin(2.0 * np.pi * x / 0.02) + 3.0 * np.sin(2.0 * np.pi * x / 0.1) + 9.0 * np.sin(2.0 * np.pi * x / 0.5)
     assert strongest_periods(x, signal, 1e-3, 0.01, 3) == pytest.approx([0.5, 0.1, 0.02], rel=0.03)
     assert strongest_periods(x, signal, 1e-3, 0.05, 1, 0.3) == pytest.approx([0.1], rel=0.03)
+
+
+@pytest.mark.parametrize(("span", "turns", "trend"), [(1.0, 7.3, 0.0), (1e5, 41.13, 0.0), (1.0, 5.3, 3.0)])
+def test_a_period_is_refined_by_the_rows(span: float, turns: float, trend: float) -> None:
+    """Beside what varies slowly, and over a million radians as well."""
+    x = np.linspace(0.0, span, 20_000)
+    signal = np.sin(2.0 * np.pi * turns * x / span) + trend * (x / span) ** 2
+    signal += np.random.default_rng(1).normal(0.0, 0.3, x.size)
+    (rough,) = strongest_periods(x, signal, span / 2000, span / 500, 1, 0.4 * span)
+    refined = refined_period(x, signal, rough, span / 500, 0.4 * span)
+    assert abs(span / refined - turns) < 0.1
+    assert abs(span / refined - turns) <= abs(span / rough - turns) + 0.02
+
+
+def test_a_refined_period_stays_between_its_limits() -> None:
+    x = np.linspace(0.0, 1.0, 20_000)
+    assert refined_period(x, np.sin(2.0 * np.pi * x / 0.45), 0.383, 0.01, 0.4) <= 0.4
+    assert refined_period(x, np.sin(2.0 * np.pi * x / 0.45), 0.5, 0.01, 0.2) == 0.5
 
 
 @given(st.integers(0, 1000), st.floats(0.5, 30.0))

@@ -31,7 +31,7 @@ class Question:
     `length` is the unit of positions, m or rad. `by_direction`: it is counted from its `least` value on, and further by
     `by_direction` where the axis moves up. `choices`: number of quantities of which the residual itself chose this one.
     `period`: what the position is folded on, 0 for none. `change`: asked is from which moment on a coefficient of the
-    plain model is another one; `steady`: at which rate it changes.
+    plain model is another one, or at which rate it changes.
     """
 
     name: str
@@ -43,8 +43,7 @@ class Question:
     least: float = 0.0
     choices: int = 1
     period: float = 0.0
-    change: MomentOfChange | None = None
-    steady: SteadyChange | None = None
+    change: MomentOfChange | SteadyChange | None = None
 
 
 def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
@@ -96,7 +95,9 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
     return Question("time", "s", length, later, 2 * BINS, duration, begin)
 
 
-def changes_over_time(data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel) -> Question | None:
+def change_over_time(
+    data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel
+) -> MomentOfChange | SteadyChange | None:
     """How a coefficient of the plain model, or the delay of the torque, changes: at a moment, or that delay steadily.
 
     The one of less chance; None where the rows tell none.
@@ -113,8 +114,13 @@ def changes_over_time(data: Dataset, parts: Sequence[ResidualSeries], plain: Pla
     moment = moment_of_change(parts, columns, times_s)
     steady = steady_change(parts, columns, times_s, LATENESS) if LATENESS in columns[0] else None
     if steady and not (moment and moment.course.p <= steady.course.p):
-        return Question(CLOCK, "s", "", (), steady=steady)
-    return Question(MOMENT, "s", "", (), change=moment) if moment else None
+        return steady
+    return moment
+
+
+def about(change: MomentOfChange | SteadyChange) -> Question:
+    """The question that a change over time answers."""
+    return Question(CLOCK if isinstance(change, SteadyChange) else MOMENT, "s", "", (), change=change)
 
 
 def _of_lateness(moved: MeasuredMotion, plain: PlainModel, period_s: float) -> FloatArray:

@@ -19,7 +19,8 @@ from hil.diagnosis.questions import (
     LATENESS,
     OFFSET,
     Question,
-    changes_over_time,
+    about,
+    change_over_time,
     everywhere,
     folded,
     over_time,
@@ -79,10 +80,9 @@ class Dependence:
         at = int(np.argmax(np.abs(found.means) / np.maximum(found.errors, 1e-300)))
         value, low, high = (float(one) for one in (found.means[at], found.edges[at], found.edges[at + 1]))
         more = "more" if value > 0.0 else "less"
-        if question.change:
-            return f"{_changed(question.change, drive_unit)} ({by_chance(found.p)})"
-        if question.steady:
-            return f"{_apart(question.steady)} ({by_chance(found.p)})"
+        if (change := question.change) is not None:
+            told = _apart(change) if isinstance(change, SteadyChange) else _changed(change, drive_unit)
+            return f"{told} ({by_chance(found.p)})"
         if self.channel == TORQUE:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
         else:
@@ -237,11 +237,9 @@ def _dependences(
     if found := structure(of_whole, question.values, question.bins):
         found = replace(found, p=max(found.p, slow(of_whole, question.values, found)))
         yield Dependence(channel, question, found, found.energy / all_of_it, found.energy / least, None)
-    if channel == TORQUE and one_way and (at := changes_over_time(whole, of_whole, plain)):
-        change = at.change or at.steady
-        assert change is not None
+    if channel == TORQUE and one_way and (change := change_over_time(whole, of_whole, plain)):
         found = change.course
-        yield Dependence(channel, at, found, min(found.energy / all_of_it, 1.0), found.energy / least, None)
+        yield Dependence(channel, about(change), found, min(found.energy / all_of_it, 1.0), found.energy / least, None)
 
 
 def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:

@@ -15,6 +15,7 @@ from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
 
 KNOTS = 6
+_PLACE = Dimension.LENGTH
 
 
 @njit
@@ -72,24 +73,22 @@ def _reading_within_period(value: float, at: Moment, parameters: Row, memory: Ro
     return value + line
 
 
-def _parameters(over: str, quantity: Dimension, of: str, what: Dimension) -> tuple[Parameter, ...]:
-    return (
-        Parameter(f"first_{over}", quantity, -1e4, 1e4),
-        Parameter(f"last_{over}", quantity, -1e4, 1e4),
-        *(Parameter(f"knot_{number}_{of}", what, -1e6, 1e6, role=Role.STRENGTH) for number in range(1, KNOTS + 1)),
-    )
-
-
 def _map(
-    name: str, block: Block, stage: Stage, law: Callable[..., float], text: str, parameters: tuple[Parameter, ...]
+    name: str, stage: Stage, law: Callable[..., float], text: str, over: str = "position_m", along: Dimension = _PLACE
 ) -> Mechanism:
+    of_torque = stage is Stage.MOTOR_TORQUE
+    of, what = ("n_m", Dimension.TORQUE) if of_torque else ("m", Dimension.LENGTH)
     return Mechanism(
         id=name,
-        block=block,
+        block=Block.MOTOR_SIDE if of_torque else Block.SENSOR,
         element="unknown",
         equation="straight lines between six knots",
         source="measured residual; no law",
-        parameters=parameters,
+        parameters=(
+            Parameter(f"first_{over}", along, -1e4, 1e4),
+            Parameter(f"last_{over}", along, -1e4, 1e4),
+            *(Parameter(f"knot_{number}_{of}", what, -1e6, 1e6, role=Role.STRENGTH) for number in range(1, KNOTS + 1)),
+        ),
         variants=(Variant(stage, law),),
         text=Text(text, Picture.TIME),
     )
@@ -97,43 +96,35 @@ def _map(
 
 TORQUE_OVER_POSITION = _map(
     "unnamed_torque_over_position",
-    Block.MOTOR_SIDE,
     Stage.MOTOR_TORQUE,
     _torque_over_position,
     "The axis needs more torque that depends on the position.",
-    _parameters("position_m", Dimension.LENGTH, "n_m", Dimension.TORQUE),
 )
 TORQUE_OVER_SPEED = _map(
     "unnamed_torque_over_speed",
-    Block.MOTOR_SIDE,
     Stage.MOTOR_TORQUE,
     _torque_over_speed,
     "The axis needs more torque that depends on the speed.",
-    _parameters("speed_rad_s", Dimension.MOTOR_SPEED, "n_m", Dimension.TORQUE),
+    "speed_rad_s",
+    Dimension.MOTOR_SPEED,
 )
 READING_OVER_POSITION = _map(
     "unnamed_reading_over_position",
-    Block.SENSOR,
     Stage.TABLE_READING,
     _reading_over_position,
     "The second encoder reads more than the position of the table, depending on the position.",
-    _parameters("position_m", Dimension.LENGTH, "m", Dimension.LENGTH),
 )
 TORQUE_WITHIN_PERIOD = _map(
     "unnamed_torque_within_period",
-    Block.MOTOR_SIDE,
     Stage.MOTOR_TORQUE,
     _torque_within_period,
     "The axis needs more torque that depends on the place within a period of the position.",
-    _parameters("position_m", Dimension.LENGTH, "n_m", Dimension.TORQUE),
 )
 READING_WITHIN_PERIOD = _map(
     "unnamed_reading_within_period",
-    Block.SENSOR,
     Stage.TABLE_READING,
     _reading_within_period,
     "The second encoder reads more than the position of the table, depending on the place within a period.",
-    _parameters("position_m", Dimension.LENGTH, "m", Dimension.LENGTH),
 )
 MAPS = (
     TORQUE_OVER_POSITION, TORQUE_OVER_SPEED, READING_OVER_POSITION, TORQUE_WITHIN_PERIOD, READING_WITHIN_PERIOD

@@ -44,7 +44,7 @@ def _units(one: Dependence, drive_unit: str) -> tuple[float, str, float, str]:
     """Factor and unit of the quantity, factor and unit of the residual."""
     along, along_unit = reading_unit(one.question.unit, float(np.max(np.abs(one.found.edges))))
     unit = drive_unit if one.channel == TORQUE else one.question.length
-    if change := one.question.change or one.question.steady:
+    if change := one.question.change:
         _, unit = coefficient(change, drive_unit)
     factor, name = reading_unit(unit, float(np.max(np.abs(one.found.means))))
     return along, along_unit, factor, name
@@ -63,10 +63,10 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
         axis.errorbar(along * x, y, error, color=colour, label=label, fmt="o-", markersize=4, capsize=3, linewidth=0.8)
     axis.axhline(0.0, color=COMMAND, linewidth=0.8)
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
-    if change := one.question.change or one.question.steady:
+    if change := one.question.change:
         what = f"{coefficient(change, drive_unit)[0]} beyond the twin's"
     title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name.partition(' (')[0]}"
-    over = "time" if one.question.change or one.question.steady else one.question.name
+    over = "time" if one.question.change else one.question.name
     style_axis(axis, f"{what}\n[{unit}]", f"{over} [{along_unit}]", title)
     if turn:
         axis.legend(frameon=False)

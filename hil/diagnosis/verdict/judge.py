@@ -8,6 +8,7 @@ import numpy as np
 from hil.diagnosis.acceptance import EXPLAINED
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, accepted, examine
+from hil.diagnosis.moment_of_change import MomentOfChange
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
@@ -49,7 +50,7 @@ def judge(tested: Tested) -> Judged:
     named = of_plant is Verdict.MISSING_PHYSICS
     open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
-    moves, whole = any(one.question.change for one in beside), refit.fit
+    moves, whole = any(isinstance(one.question.change, MomentOfChange) for one in beside), refit.fit
     if open_ones or (moves and not searched.stopped_at):
         whole = _with_loads(refit.fit, final)
         change = _better(changed(whole, held_out, moves), searched.nominal, final, held_out)

@@ -11,6 +11,7 @@ from foreign_axis import COULOMB_N_M, INERTIA_KG_M2, axis, renamed, write
 from hil.bench.bench_file import load_bench
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
+from hil.diagnosis.moment_of_change import SteadyChange
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.structure_left import TORQUE, structure_left
 from hil.explanation import explain
@@ -71,11 +72,12 @@ def test_a_clock_of_the_torque_that_runs_fast_is_seen(tmp_path: Path, rate: floa
     identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
     prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
     left = structure_left(fit_nominal_parameters(prepared.train), prepared.held_out)
-    (clock,) = (one for one in left if one.question.steady)
-    assert clock.question.steady is not None
-    assert clock.question.steady.rate == pytest.approx(-rate, rel=0.1)
-    assert f"the torque is recorded {1e3 * rows * 1e-3 * abs(rate):.1f}"[:-1] in clock.in_words("N m")
-    assert f" {way} than at the begin" in clock.in_words("N m")
+    ((clock, words),) = (
+        (one.question.change, one.in_words("N m")) for one in left if isinstance(one.question.change, SteadyChange)
+    )
+    assert clock.rate == pytest.approx(-rate, rel=0.1)
+    assert f"the torque is recorded {1e3 * rows * 1e-3 * abs(rate):.1f}"[:-1] in words
+    assert f" {way} than at the begin" in words
 
 
 def test_a_change_of_friction_is_seen_at_one_speed_too(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ DRAG_N_M, PLAY_RAD, RAMP_RAD = 0.15, 12.0, 1.0
 
 
 def left_by(extra: np.ndarray, folder: Path) -> list[Dependence]:
-    """What the twin of the drafted bench leaves of the torque, for an axis with `extra` torque (n,) added."""
+    """Torque that the twin of the drafted bench leaves, for an axis with `extra` torque (n,) added."""
     folder.mkdir()
     table = {"time_s": COLUMNS["t"], "motor_angle_rad": COLUMNS["angle"], "torque_Nm": COLUMNS["torque"] + extra}
     import_(write(folder / "log.csv", table), None, folder / "log.parquet", None, None)

@@ -1,4 +1,4 @@
-"""What repeats within a period of the position and has no name gets a map."""
+"""A residual that repeats within a period of the position gets a map if no mechanism names it."""
 
 from __future__ import annotations
 

@@ -27,10 +27,16 @@ _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is to
 
 
 class ResidualSeries(NamedTuple):
-    """A residual (n,) of one recording, and the rows (n,) that count."""
+    """A residual (n,) of one recording, the rows (n,) that count, and those in which the twin sticks."""
 
     left: FloatArray
     rows: NDArray[np.bool_]
+    sticks: NDArray[np.bool_] | None = None
+
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """Rows (n,) in which the twin does not stick: there its residual is no torque that it lacks."""
+        return np.ones(self.left.size, dtype=bool) if self.sticks is None else ~self.sticks
 
 
 @dataclass(frozen=True, eq=False)

@@ -134,21 +134,24 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast
         motion = measured_motion(run)
         rows = motion.sliding(plain.slowest)
         innovation_with = partial(_innovation, hypothesis, run, data.observer_s, fast)
-        found.append(ResidualSeries(-_lacking(innovation_with, run, motion, rows), rows))
+        lacking, sticks = _lacking(innovation_with, run, motion, rows)
+        found.append(ResidualSeries(-lacking, rows, sticks))
     return found
 
 
 def _lacking(
     innovation_with: Callable[[FloatArray], FloatArray], run: Measured, motion: MotionData, rows: NDArray[np.bool_]
-) -> FloatArray:
-    """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,); NaN where no torque moves it.
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,), and rows in which it sticks without.
+
+    The torque is NaN where none moves the twin.
 
     The innovation of a twin that slides tells it. Where a torque less by its noise stops one that creeps, it gets more,
     which counts as lacking, as long as fewer rows stick then.
     """
     way, deviation = motion.moved.direction, float(np.std(run.torque))
     more, added, noise = np.zeros(run.motor.size), _ADDED * deviation * way, run.noise.torque
-    found, before = np.full(run.motor.size, np.nan), np.count_nonzero(rows) + 1
+    found, stuck, before = np.full(run.motor.size, np.nan), rows, np.count_nonzero(rows) + 1
     for _ in range(_AGAIN):
         innovation = innovation_with(more)
         moved = (innovation - innovation_with(more + added)) * way
@@ -156,12 +159,13 @@ def _lacking(
         sticks = rows & (moved < 0.5 * scale)
         if not scale > 0.0 or np.count_nonzero(sticks) >= before:
             break
-        found, before = innovation * _ADDED * deviation / scale + more, np.count_nonzero(sticks)
+        found, stuck = innovation * _ADDED * deviation / scale + more, sticks | (more != 0.0)
+        before = np.count_nonzero(sticks)
         if before <= _FEW * np.count_nonzero(rows):
             break
         more = np.where(maximum_filter1d(sticks, motion.window), more + noise * way, more)
         noise *= 2.0
-    return np.asarray(found, dtype=np.float64)
+    return np.asarray(found, dtype=np.float64), stuck
 
 
 def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray) -> FloatArray:

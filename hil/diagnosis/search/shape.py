@@ -70,12 +70,17 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
     # then one is the shape, and no nuisance
     offset = any(Active(term.effect, term.values, term.variant).is_offset for term in added)
     for channel, own in asked.channels.items():
-        after = _joined(left_in_channel(shaped, asked.quiet, channel, asked.plain, fast), own.rows)
-        shape = own.quiet - after
-        if not _holds(shape):
+        after = left_in_channel(shaped, asked.quiet, channel, asked.plain, fast)
+        rows = [at & one.clear for at, one in zip(own.rows, after, strict=True)]
+        counted = np.concatenate([one.clear[at] for at, one in zip(own.rows, after, strict=True)])
+        shape = own.quiet[counted] - _joined(after, rows)
+        if shape.size < _FEWEST_ROWS or not _holds(shape):
             continue
-        matrix = np.column_stack([shape, own.beside[:, ~own.constant] if offset else own.beside])
-        size, ratio, free = _first_coefficient(matrix, own.measured, own.rows, [run.laps for run in without.data.runs])
+        beside = own.beside[counted]
+        matrix = np.column_stack([shape, beside[:, ~own.constant] if offset else beside])
+        size, ratio, free = _first_coefficient(
+            matrix, own.measured[counted], rows, [run.laps for run in without.data.runs]
+        )
         if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
             if fitted:
                 removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
@@ -122,6 +127,8 @@ def _faint(found: Hypothesis, added: Sequence[Term], without: Fit) -> tuple[Hypo
 class _Seen(NamedTuple):
     """Residuals (m,) of a channel on the rows that slide: of the recordings, and of their smoothed motion (`quiet`).
 
+    Rows in which the twin sticks are left out.
+
     `beside` (m, q) has the columns of least squares beside a shape, `constant` (q,) marks the offsets among them. A
     shape of less energy than `least` does not count.
     """
@@ -155,9 +162,9 @@ def _asked(without: Fit, fast: bool) -> _Asked | None:
     quiet = data.over([one.smooth for one in data.apart] or smoothed_runs(data.runs, plain))
     for channel in channels(data):
         parts = left_in_channel(hypothesis, data, channel, plain, fast)
-        rows = [one.rows for one in parts]
-        measured = _joined(parts, rows)
-        own = _joined(left_in_channel(hypothesis, quiet, channel, plain, fast), rows)
+        calm = left_in_channel(hypothesis, quiet, channel, plain, fast)
+        rows = [one.rows & one.clear & other.clear for one, other in zip(parts, calm, strict=True)]
+        measured, own = _joined(parts, rows), _joined(calm, rows)
         if measured.size < _FEWEST_ROWS or not (_holds(measured) and _holds(own)):
             continue
         beside = [np.ones_like(measured)]

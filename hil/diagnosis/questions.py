@@ -49,28 +49,31 @@ class Question:
 def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
     """Quantities that mean the same in every recording."""
     motions = [measured_motion(run).moved for run in data.runs]
-    ratio = hypothesis.bench.axis.ratio_m_rad
-    position = tuple(ratio * moved.position for moved in motions)
-    low = min(float(one.min()) for one in position)
-    span = max(float(one.max()) for one in position) - low
-    length = "rad" if hypothesis.bench.axis.turns else "m"
-    up = [moved.velocity > 0.0 for moved in motions]
-    by_direction = tuple(one - low + 1.001 * span * moves for one, moves in zip(position, up, strict=True))
+    axis, ratio = hypothesis.bench.axis, hypothesis.bench.axis.ratio_m_rad
+    length = "rad" if axis.turns else "m"
+    speed = [ratio * moved.velocity for moved in motions]
+    position = [ratio * moved.position for moved in motions]
     since = [ratio * _since_reversal(moved) for moved in motions]
-    farthest = 1.001 * max(float(one.max()) for one in since)
-    by_reversal = tuple(one + farthest * moves for one, moves in zip(since, up, strict=True))
     load = [plain.predict(moved) for moved in motions]
-    least = min(float(one.min()) for one in load)
-    range_ = 1.001 * (max(float(one.max()) for one in load) - least)
-    by_load = tuple(one - least + range_ * moves for one, moves in zip(load, up, strict=True))
+    power = [one * moved.velocity for one, moved in zip(load, motions, strict=True)]
+
+    def by_direction(name: str, unit: str, values: Sequence[FloatArray]) -> Question:
+        least = min(float(one.min()) for one in values)
+        range_ = 1.001 * (max(float(one.max()) for one in values) - least)
+        by_way = (one - least + range_ * (way > 0.0) for one, way in zip(values, speed, strict=True))
+        return Question(name, unit, length, tuple(by_way), 2 * BINS, range_, least)
+
+    low = min(float(one.min()) for one in position)
     return [
-        Question(POSITION, length, length, position),
-        Question("distance from the first position", length, length, by_direction, 2 * BINS, 1.001 * span),
+        Question(POSITION, length, length, tuple(position)),
+        by_direction("distance from the first position", length, [one - low for one in position]),
         # presliding contacts, covers and cables that are dragged along
-        Question("distance from the last reversal", length, length, by_reversal, 2 * BINS, farthest),
-        Question(SPEED, f"{length}/s", length, tuple(ratio * moved.velocity for moved in motions)),
+        by_direction("distance from the last reversal", length, since),
+        Question(SPEED, f"{length}/s", length, tuple(speed)),
         # friction of a load has its sign
-        Question("load", hypothesis.bench.axis.drive_unit, length, by_load, 2 * BINS, range_, least),
+        by_direction("load", axis.drive_unit, load),
+        # at the limit of its voltage a drive gives less torque while the motor drives, and not while it brakes
+        *([] if axis.drive_unit == "V" else [by_direction("power", "W", power)]),
     ]
 
 

@@ -250,7 +250,7 @@ class Result(ResultPart):
     location: Location | None = Field(description="null without a mismatch")
     missing: tuple[Finding, ...] = Field(description="physics that the twin lacks, the one with most energy first")
     partial: tuple[Finding, ...] = Field(
-        (), description="only for `unexplained`: mechanisms that explain most of the mismatch and leave more than noise"
+        (), description="only for `unexplained`: mechanisms that explain a part of the mismatch"
     )
     change: AxisChange | None = Field(None, description="for `axis_changed`; for `unexplained` one that explains most")
     parameter_corrections: dict[str, Correction]

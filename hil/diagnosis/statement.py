@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
-from hil.diagnosis.ledger import EXPLAINS
 from hil.diagnosis.open_questions import cannot_show
 from hil.diagnosis.result import AT_FLOOR, CLOCK, MOMENT, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
 from hil.diagnosis.value import Correction
@@ -37,7 +36,7 @@ def statement(result: Result) -> str:
     if result.change is not None:
         return f"{_of_axis(result.change, result)}{_left(result)}"
     if result.time_budget and not result.partial:
-        return f"The time budget ended before the mismatch was explained{_unexplained(result)}{_closest(result)}"
+        return f"The time budget ended before the mismatch was explained{_unexplained(result)}"
     if result.partial:
         share = percent(1.0 - result.unexplained.share)
         return (
@@ -48,7 +47,7 @@ def statement(result: Result) -> str:
     what = (
         "No named physics is missing" if at_floor else "The mismatch is not explained by any mechanism of the library"
     )
-    return f"{what}{_unexplained(result)}{_closest(result)}"
+    return f"{what}{_unexplained(result)}"
 
 
 def explained(result: Result) -> bool:
@@ -144,18 +143,6 @@ def _unexplained(result: Result) -> str:
         return f"; below the noise of a row, {result.structure[0].text}."
     told = _leaves(result.torque_left)
     return f"; every channel is within its noise{f', and the twin {told}' if told else ''}."
-
-
-def _closest(result: Result) -> str:
-    """The terms that explain too little for a name, with their share, as a sentence; empty without any."""
-    near = [one for one in result.considered if [rule.rule for rule in one.rules if not rule.accepted] == [EXPLAINS]]
-    share = 1.0 - float(near[-1].rules[-1].figures["left"] or 0.0) if near else 0.0
-    if share < CRITERIA.worth:
-        return ""
-    effects = titles(dict.fromkeys(one.effect for one in near))
-    return (
-        f" Closest comes {effects} with {percent(share)} of the energy above the noise; below a half it is no answer."
-    )
 
 
 def _leaves(left: TorqueLeft | None) -> str:

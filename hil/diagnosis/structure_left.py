@@ -137,18 +137,23 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    asked = len(channels(fit.data)) * (
-        len(everywhere(fit.hypothesis, fit.data, plain)) + 4
-    )  # a line, time, a moment or a rate
-    level = CRITERIA.significance / max(asked, 1)
-    counted = [
-        one
-        for one in found
-        if one.found.p * one.question.choices < level
-        and one.material > 1.0
-        and (one.held_out is None or one.held_out > 0.0)
-    ]
+    asked = len(channels(fit.data)) * (len(everywhere(fit.hypothesis, fit.data, plain)) + 4)  # a line, time, its change
+    told = _told(found, asked)
+    counted = [one for one in told if one.material > 1.0 and (one.held_out is None or one.held_out > 0.0)]
     return tuple(sorted(counted, key=lambda one: -one.explained))
+
+
+def _told(found: Sequence[Dependence], asked: int) -> list[Dependence]:
+    """Dependences that chance makes in none of the questions `asked`: each test beside the answers that are told.
+
+    S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979) 65.
+    """
+    told: list[Dependence] = []
+    for one in sorted(found, key=lambda one: one.found.p * one.question.choices):
+        if one.found.p * one.question.choices * max(asked - len(told), 1) >= CRITERIA.significance:
+            break
+        told.append(one)
+    return told
 
 
 def like_noise(fit: Fit, left: Sequence[Dependence]) -> frozenset[str]:

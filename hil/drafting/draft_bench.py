@@ -14,6 +14,7 @@ from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.ratio_values import gear_of
 from hil.drafting.sensor_values import noise_of
 from hil.identification.derived_channels import rows_are_ticks
+from hil.identification.law.result import sure
 from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
 from hil.quantities import ROTARY_LEAD_M, digits, unit_of
@@ -25,6 +26,7 @@ _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a be
 _MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
 # Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
+_GAINS = ("position_gain_1_s", "velocity_feedforward", "velocity_gain_n_m_s_rad", "velocity_gain_n_s_m")
 _STEPS_PER_NOISE = sqrt(12.0)  # a count of q has noise of q / sqrt(12)
 
 
@@ -91,6 +93,10 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
         else:
             _screw(draft, plant, deflection, lead)
     draft.control, draft.control_why = loop_values(recording, ratio)
+    if draft.control and _is_sampled(recording, plant):
+        gains = ", ".join(f"{one.key} {one.shown}" for one in draft.control if one.key in _GAINS)
+        draft.notes.append(f"gains of a loop in steps of the rows that come close: {gains}")
+        draft.control, draft.control_why = [], "rows are samples of a faster loop: its torque is not held between them"
     if not draft.control:
         draft.torque_delay = _torque_delay(recording, plant)
     if transmission is None and not draft.control:
@@ -103,9 +109,18 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
     return draft
 
 
+def _is_sampled(recording: Recording, plant: PlantValues) -> bool:
+    """True if the torque of a row has acted before one that is held until the next row would."""
+    early = plant.early_s
+    if early is None or not early.std_error > 0.0 or rows_are_ticks(recording):
+        return False
+    late_rows = 0.5 - early.value / recording.period_s
+    return late_rows > 0.0 and sure(late_rows, early.std_error / recording.period_s)
+
+
 def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None:
     """Delay of a torque whose rows are samples, of which the twin holds each until the next; None where not told."""
-    if plant.early_s is None or rows_are_ticks(recording):
+    if plant.early_s is None or not plant.early_s.value or rows_are_ticks(recording):
         return None
     early = plant.early_s
     delay_s = early.value - 0.5 * recording.period_s

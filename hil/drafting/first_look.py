@@ -61,7 +61,7 @@ def _plain(told: PlantTold, recording: Recording) -> list[str]:
 
 
 def _when(early_s: Estimate | None, effort: str) -> str:
-    if early_s is None:
+    if early_s is None or not early_s.value:
         return ""
     way = "early" if early_s.value > 0.0 else "late"
     return f"; the {effort} is recorded {quantity(abs(early_s.value), 's')} {way}"

@@ -28,7 +28,7 @@ class PlantValues:
     `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load. `spring` is
     the torque over the motor's position k [N m/rad, N/m]. `one_way` is Coulomb friction and load together, in the
     direction of a motion that does not tell them apart; then half of it stands for each. `early_s` [s]: the torque is
-    recorded so much before the motion that it makes; None where it is not told.
+    recorded so much before the motion that it makes; 0 where that is within its error.
     """
 
     inertia: Estimate
@@ -118,8 +118,7 @@ def plant_values(recordings: Sequence[Recording], load_ratio: float | None = Non
             for one, size in ((viscous, viscous.value), (coulomb, viscous.value * top))
         )
     viscous, coulomb = _at_feeds(recordings, viscous, coulomb) or (viscous, coulomb)
-    rows = Estimate(model.early_rows, model.early_error_rows, fit.how)
-    early = rows.scaled(data[0].period_s) if model.early_rows else None
+    early = Estimate(model.early_rows, model.early_error_rows, fit.how).scaled(data[0].period_s)
     return PlantValues(inertia, viscous, coulomb, offset, fit.left, gravity, angle, spring, one_way, early)
 
 

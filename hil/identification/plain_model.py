@@ -249,7 +249,7 @@ def fit_plain_model(
         return fit if len(names) == len(MOTION) or fit.differs(names[len(MOTION) :]) else final(MOTION)
 
     fit = final([name for name in again.names if name not in _LAW])
-    return PlainModel(fit, slowest, load_ratio, early_rows, timed[_LOGGED].std_error if early_rows else 0.0)
+    return PlainModel(fit, slowest, load_ratio, early_rows, timed[_LOGGED].std_error)
 
 
 def _far(data: Sequence[MotionData], slowest: SlowestSliding, load_ratio: float | None) -> int:

@@ -18,7 +18,7 @@ from hil.identification.measured import take
 from hil.identification.terms import Term
 
 OWNER = bench()
-COGGING, LOAD = Term("cogging_torque", 0, (0.3, 6.0, 0.2)), Term("constant_load", 0, (0.08,))
+COGGING, LOAD = Term("cogging_torque", 0, (0.3, 6.0, 0.2)), Term("constant_load", 0, (0.1,))
 
 
 @dataclass

@@ -36,3 +36,17 @@ def test_time_stamps_that_are_late_now_and_then_are_no_force(tmp_path: Path, lat
     facts = axis_facts(prepared.bench, prepared.train.runs)
     assert facts.grows_with_speed(LINE_HZ) is bool(late_s)
     assert BY_ID["periodic_force"].is_claimable((0.1, LINE_HZ, 0.0), 0, facts) is not bool(late_s)
+
+
+@pytest.mark.parametrize(("waves", "may_be"), [(4.5, False), (5.5, True)])
+def test_a_force_needs_five_waves_in_the_recording(tmp_path: Path, waves: float, may_be: bool) -> None:
+    """Of which the part that is not held out has fewer."""
+    columns = axis(24_000)
+    line_hz = waves / float(columns["t"][-1])
+    torque = columns["torque"] - 0.1 * np.sin(2.0 * np.pi * line_hz * columns["t"])
+    table = {"time_s": columns["t"], "motor_angle_rad": columns["angle"], "torque_Nm": torque}
+    import_(write(tmp_path / "log.csv", table), None, tmp_path / "log.parquet", None, None)
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    facts = axis_facts(prepared.bench, prepared.train.runs)
+    assert BY_ID["periodic_force"].is_claimable((0.1, line_hz, 0.0), 0, facts) is may_be

@@ -13,6 +13,7 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.verdict.each_alone import _late_otherwise
+from hil.explanation import explain
 from hil.identification.estimator import Fit
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.recording.recording import read_recording
@@ -40,3 +41,15 @@ def test_plain_least_squares_tell_another_lateness(tmp_path: Path, rows_late: in
     one, other = fitted(tmp_path / "one", 0, 1), fitted(tmp_path / "other", rows_late, 2)
     assert _late_otherwise(one, other) is shifted
     assert _late_otherwise(other, one) is shifted
+
+
+def test_clocks_that_run_apart_have_not_shifted(tmp_path: Path) -> None:
+    """A delay that grows by 0.2 ms per second differs from part to part, and at no moment."""
+    columns = axis(4 * ROWS)
+    columns["torque"] = np.interp(columns["t"] * (1.0 - 2e-4), columns["t"], columns["torque"])
+    columns["torque"] += np.random.default_rng(3).normal(0.0, NOISE_N_M, 4 * ROWS)
+    path = write(tmp_path / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
+    told = explain([path], tmp_path / "out").diagnosis.result
+    assert told.change is None
+    assert "the clocks of torque and position run apart by 20" in told.statement
+    assert "shifted" not in told.statement

@@ -39,6 +39,7 @@ from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.physics import Active
 
 MOST_TERMS = 8  # at once: more than an engineer can act on; limits the duration of a search
+_INPUT = 1e-6  # rms over noise below which a channel is fed to the twin as it is, and tells nothing
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,8 @@ def unexplained_channels(fit: Fit) -> dict[str, float]:
     rms = {name: max(ratios[name] for ratios in fit.noise_ratios) ** 0.5 for name in fit.noise_ratios[0]}
     floor = CRITERIA.floor if fit.data.observability.exact_input else CRITERIA.coloured
     left = {name: value for name, value in rms.items() if value**2 > floor}
-    return left if set(rms) - set(left) - fit.data.observability.hidden else {}
+    inputs = {name for name, value in rms.items() if value < _INPUT}
+    return left if set(rms) - set(left) - inputs - fit.data.observability.hidden else {}
 
 
 def less_torque(plain: PlainModel, *fits: Fit) -> Fit:

@@ -43,10 +43,13 @@ def statement(result: Result) -> str:
             f"{'The time budget ended, and no' if result.time_budget else 'No'} mechanism of the library explains the "
             f"whole mismatch. {_found(f'For {share} of its energy above the noise', result.partial)}{_left(result)}"
         )
-    at_floor = result.unexplained.description == AT_FLOOR
-    what = (
-        "No named physics is missing" if at_floor else "The mismatch is not explained by any mechanism of the library"
-    )
+    what = "The mismatch is not explained by any mechanism of the library"
+    if result.unexplained.description == AT_FLOOR:
+        what = "No named physics is missing"
+    elif clocks := next((one.text for one in result.structure if one.over == CLOCK), ""):
+        rest = tuple(one for one in result.structure if one.over != CLOCK)
+        result = result.model_copy(update={"structure": rest})
+        what = f"{clocks[:1].upper()}{clocks[1:]}. No mechanism of the library explains the mismatch"
     return f"{what}{_unexplained(result)}"
 
 

@@ -40,9 +40,10 @@ def choose_efforts(
     """Choose among the columns `names` (n,); `constants` are those that the file gives.
 
     A column that the motion explains hardly or far less than another one is none. Of the others a torque or force comes
-    before a current, a whole one before a part such as friction, then the one that the motion explains better.
+    before a current, a whole one before a part such as friction, then the one that the motion explains better. A motor
+    that turns makes no force: beside its speed a force is one that was measured elsewhere.
     """
-    found = Efforts()
+    found, turns = Efforts(), any(one.unit == "rpm" for one in labels.values())
     shares = {name: max(driven(live[name], moved, period_s).share, 0.0) for name in names}
     best = max(shares.values(), default=0.0)
     for name in list(names):
@@ -52,7 +53,8 @@ def choose_efforts(
 
     def rank(name: str) -> tuple[bool, int, bool, float]:
         one = labels[name]
-        return one.table, _told(one, constants), one.part, -round(shares[name], 2)
+        elsewhere = turns and UNITS.get(one.unit or "", ("",))[0] == "N"
+        return one.table or elsewhere, _told(one, constants), one.part, -round(shares[name], 2)
 
     voltage = [name for name in names if (labels[name].unit or labels[name].electric) in ("V", "mV")]
     commands = [name for name in names if labels[name].command or name in voltage]

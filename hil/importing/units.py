@@ -98,6 +98,9 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
     for bracket in reversed(list(_ANY_BRACKETS.finditer(name))):  # Current [A] (Axis 1)
         if unit := unit_named(bracket[1]):
             return f"{name[: bracket.start()]} {name[bracket.end() :]}".strip(), unit, False
+    before, joint, ratio = name.rpartition("_")
+    if joint and "/" in ratio and not ratio.startswith("/") and (unit := unit_named(ratio)):  # speed_1/min
+        return before, unit, False
     for pattern in (_BRACKETS, _SLASH, _WORD_IN):
         match = pattern.search(name)
         if match:

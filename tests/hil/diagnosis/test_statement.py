@@ -6,7 +6,7 @@ from typing import Any
 
 from example_result import EXAMPLE
 
-from hil.diagnosis.result import AT_FLOOR, NO_STRUCTURE, Result
+from hil.diagnosis.result import AT_FLOOR, CLOCK, NO_STRUCTURE, Result
 from hil.diagnosis.statement import statement
 from hil.twin.library import LIBRARY
 
@@ -71,6 +71,15 @@ def test_residuals_above_the_noise_are_a_mismatch() -> None:
     left = {"description": "Residuals above the noise (rms): torque 3.00 times.", "share": 0.5}
     told = said(verdict="unexplained", unexplained=left, structure=(TIME,))
     assert told.startswith("The mismatch is not explained by any mechanism of the library: Residuals above the noise")
+    assert f"Structure is left: {TIME['text']}." in told
+
+
+def test_clocks_that_run_apart_are_told_first() -> None:
+    left = {"description": "Residuals above the noise (rms): motor position 2.47 times.", "share": 1.0}
+    apart = TIME | {"over": CLOCK, "text": "the clocks of torque and position run apart by 186 ppm"}
+    told = said(verdict="unexplained", unexplained=left, structure=(TIME, apart))
+    assert told.startswith("The clocks of torque and position run apart by 186 ppm. No mechanism of the library")
+    assert told.count("186 ppm") == 1
     assert f"Structure is left: {TIME['text']}." in told
 
 

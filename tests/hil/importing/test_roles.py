@@ -138,3 +138,19 @@ def test_an_angle_beside_a_length_is_no_set_point(tmp_path: Path, unit: str, siz
     found = {one.channel: str(one.entry["column"]) for one in draft.channels}
     assert (found.get("table_position_m") == "wheel_mm") is table
     assert ("position_command_m" in found) is not table
+
+
+@pytest.mark.parametrize(("speed", "effort"), [("Drehzahl_1/min", "Moment_Ist_%"), ("Tempo_mm/s", "Kraft_kN")])
+def test_a_force_beside_a_motor_that_turns_is_not_its_own(tmp_path: Path, speed: str, effort: str) -> None:
+    """A load cell, even where the motion explains it better than the torque of the motor."""
+    noise = np.random.default_rng(3).normal(0.0, 0.2, AXIS["t"].size)
+    columns = {
+        "Zeit_s": AXIS["t"],
+        "Lage_Ist_mm": AXIS["x_act"],
+        speed: AXIS["speed"] * (30.0 / np.pi if "min" in speed else 10.0 / (2.0 * np.pi)),
+        "Moment_Ist_%": 10.0 * (AXIS["torque"] + noise),
+        "Kraft_kN": 0.6 * AXIS["torque"],
+    }
+    chosen = [one.entry["column"] for one in draft_map(write(tmp_path / "log.csv", columns)).channels]
+    assert effort in chosen
+    assert not {"Moment_Ist_%", "Kraft_kN"} - {effort} & set(chosen)

@@ -29,7 +29,14 @@ def test_forces_and_torques_of_other_systems(spelling: str, unit: str, si: float
 
 @pytest.mark.parametrize(
     ("name", "rest", "unit"),
-    [("torque_lbf_in", "torque", "lbf in"), ("Torque [lbf in]", "Torque", "lbf in"), ("speed (in/s)", "speed", "in/s")],
+    [
+        ("torque_lbf_in", "torque", "lbf in"),
+        ("Torque [lbf in]", "Torque", "lbf in"),
+        ("speed (in/s)", "speed", "in/s"),
+        ("Drehzahl_1/min", "Drehzahl", "rpm"),
+        ("v_axis_mm/s", "v_axis", "mm/s"),
+        ("pos/mm", "pos", "mm"),
+    ],
 )
 def test_a_unit_in_the_name_of_a_column(name: str, rest: str, unit: str) -> None:
     assert split_unit(name) == (rest, unit, False)

@@ -107,12 +107,12 @@ def test_the_statement_says_what_is_sure_and_mentions_what_may_be() -> None:
     found = (
         finding("cogging_torque", 0.95, "The motor cogs."),
         finding("torque_ripple", 0.3, "The torque ripples."),
-        finding("end_stop", 0.1, "There is a stop."),
-        finding("gravity_torque", 0.01, "Gravity pulls."),
+        finding("end_stop", 0.25, "There is a stop."),
+        finding("gravity_torque", 0.1, "Gravity pulls."),
     )
     result = Result.model_validate(EXAMPLE | {"missing": found, "unexplained": FLOOR})
     assert statement(result) == (
-        "Missing physics: The motor cogs. Perhaps also torque ripple (30.0 %) and end stop (10.0 %). "
+        "Missing physics: The motor cogs. Perhaps also torque ripple (30.0 %) and end stop (25.0 %). "
         "With it the residual of the torque on held-out recordings falls from 80.0 mN m rms to its noise."
     )
     assert explained(result)

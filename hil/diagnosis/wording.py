@@ -8,7 +8,7 @@ from hil.diagnosis.result import Finding, Location
 from hil.diagnosis.turning import of_load, speed_unit
 from hil.identification.measured import Measured
 from hil.identification.terms import Term
-from hil.quantities import digits, known_quantity, quantity, unit_of
+from hil.quantities import digits, known_quantity, quantity, reading_unit, unit_of
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
@@ -123,7 +123,8 @@ def where(location: Location, turns: bool) -> dict[str, str]:
         "windows of the first recording": ", ".join(f"{a:.2f} to {b:.2f} s" for a, b in location.windows_s),
     }
     if location.position_m:
-        found["position"] = "{:.1f} to {:.1f} mm".format(*(1e3 * value for value in location.position_m))
+        factor, unit = reading_unit("rad" if turns else "m", max(map(abs, location.position_m)))
+        found["position"] = " to ".join(digits(factor * value, 4) for value in location.position_m) + f" {unit}"
     if location.speed_m_s:
         factor, unit = speed_unit(turns)
         found["speed"] = "{:.3g} to {:.3g}".format(*(factor * value for value in location.speed_m_s)) + f" {unit}"

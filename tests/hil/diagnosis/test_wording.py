@@ -49,6 +49,9 @@ def test_a_load_that_turns_has_torques_and_speeds_of_its_own() -> None:
     found = Location(block="table", element="guideways", channels=(), speed_m_s=(0.5, 2.0))
     assert where(found, turns=True)["speed"] == "0.5 to 2 rad/s"
     assert where(found, turns=False)["speed"] == "30 to 120 m/min"
+    far, near = (found.model_copy(update={"position_m": one}) for one in ((288.62, 304.6), (0.0662, 0.0756)))
+    assert where(far, turns=True)["position"] == "288.6 to 304.6 rad"
+    assert where(near, turns=False)["position"] == "66.20 to 75.60 mm"
 
 
 def test_a_sentence_says_whether_the_measured_torque_shows_an_effect() -> None:

@@ -60,7 +60,7 @@ def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list
     def by_direction(name: str, unit: str, values: Sequence[FloatArray]) -> Question:
         least = min(float(one.min()) for one in values)
         range_ = 1.001 * (max(float(one.max()) for one in values) - least)
-        by_way = (one - least + range_ * (way > 0.0) for one, way in zip(values, speed, strict=True))
+        by_way = (one - least + range_ * (moved.velocity > 0.0) for one, moved in zip(values, motions, strict=True))
         return Question(name, unit, length, tuple(by_way), 2 * BINS, range_, least)
 
     low = min(float(one.min()) for one in position)

@@ -88,7 +88,7 @@ class Judged:
     of_plant: Verdict  # on the plant alone
     verdict: Verdict  # on plant and control law
     change: Change | None  # of the axis, where the terms do not explain the mismatch
-    is_part: bool  # the terms explain most of the mismatch, and are not the name of all of it
+    is_part: bool  # the terms explain a part of the mismatch
     nominal: Fit
     before: Fit
     final: Fit

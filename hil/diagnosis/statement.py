@@ -17,7 +17,12 @@ _MORE = 1.1  # times what plain least squares leave, from which a reader asks
 
 
 def statement(result: Result) -> str:
-    """The verdict as one sentence."""
+    """The verdict as one sentence, after one on clocks that run apart where no other change is told."""
+    clocks = [one.text for one in result.structure if one.over == CLOCK]
+    if result.verdict is Verdict.UNEXPLAINED and clocks and not result.change:
+        rest = tuple(one for one in result.structure if one.over != CLOCK)
+        after = statement(result.model_copy(update={"structure": rest}))
+        return f"{clocks[0][:1].upper()}{clocks[0][1:]}. {after}"
     if result.verdict is Verdict.MISSING_PHYSICS:
         return f"{_found('Missing physics', result.missing)} {improvement(result)}{_left(result)}"
     if result.verdict is Verdict.PARAMETER_ERROR:
@@ -46,10 +51,6 @@ def statement(result: Result) -> str:
     what = "The mismatch is not explained by any mechanism of the library"
     if result.unexplained.description == AT_FLOOR:
         what = "No named physics is missing"
-    elif clocks := next((one.text for one in result.structure if one.over == CLOCK), ""):
-        rest = tuple(one for one in result.structure if one.over != CLOCK)
-        result = result.model_copy(update={"structure": rest})
-        what = f"{clocks[:1].upper()}{clocks[1:]}. No mechanism of the library explains the mismatch"
     return f"{what}{_unexplained(result)}"
 
 

@@ -137,7 +137,9 @@ def structure_left(fit: Fit, held_out: Dataset) -> tuple[Dependence, ...]:
         if not all(np.isfinite(part.left).all() for part in (*parts, *others)):
             continue  # the twin does not hold the motion
         found += list(_dependences(fit, held_out, channel, plain, (parts, others)))
-    asked = len(channels(fit.data)) * (len(everywhere(fit.hypothesis, fit.data, plain)) + 4)  # a line, time, its change
+    asked = len(channels(fit.data)) * (
+        len(everywhere(fit.hypothesis, fit.data, plain)) + 4
+    )  # offset, line, time, its change
     told = _told(found, asked)
     counted = [one for one in told if one.material > 1.0 and (one.held_out is None or one.held_out > 0.0)]
     return tuple(sorted(counted, key=lambda one: -one.explained))
@@ -150,7 +152,7 @@ def _told(found: Sequence[Dependence], asked: int) -> list[Dependence]:
     """
     told: list[Dependence] = []
     for one in sorted(found, key=lambda one: one.found.p * one.question.choices):
-        if one.found.p * one.question.choices * max(asked - len(told), 1) >= CRITERIA.significance:
+        if not one.found.p * one.question.choices * max(asked - len(told), 1) < CRITERIA.significance:
             break
         told.append(one)
     return told

@@ -92,11 +92,11 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
             _turning(draft, plant, deflection, sag, lead)
         else:
             _screw(draft, plant, deflection, lead)
-    draft.control, draft.control_why = loop_values(recording, ratio)
-    if draft.control and _is_sampled(recording, plant):
+    draft.control, draft.control_why, close = loop_values(recording, ratio)
+    if close and _is_sampled(recording, plant):
         gains = ", ".join(f"{one.key} {one.shown}" for one in draft.control if one.key in _GAINS)
         draft.notes.append(f"gains of a loop in steps of the rows that come close: {gains}")
-        draft.control, draft.control_why = [], "rows are samples of a faster loop: its torque is not held between them"
+        draft.control, draft.control_why = [], "torque is not held from row to row: a faster loop, or recorded late"
     if not draft.control:
         draft.torque_delay = _torque_delay(recording, plant)
     if transmission is None and not draft.control:

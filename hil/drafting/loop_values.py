@@ -19,8 +19,9 @@ from hil.drafting.bench_value import BenchValue
 from hil.identification.law.closed_form import closed_form, find_delays, first_tick
 from hil.identification.law.fit import fit_settings
 from hil.identification.law.replay import LawRows, Settings
-from hil.identification.law.result import REPLAYED, LawFit, preferred, sure, told_apart
+from hil.identification.law.result import REPLAYED, SURE, LawFit, preferred, sure, told_apart
 from hil.identification.parallel import one_blas_thread
+from hil.identification.sensor_noise import white_noise
 from hil.identification.terms import Term
 from hil.recording.recording import Recording
 from hil.twin.axis import Response, Start, Twin
@@ -41,10 +42,14 @@ _NOISE = 1e-4  # of the command: a scale of the residuals, of no influence on th
 
 
 class ControlValues(NamedTuple):
-    """Keys of the control section; without a law that fits, no keys and the reason."""
+    """Keys of the control section; without a law that fits, no keys and the reason.
+
+    `close`: the law stands for that of a measured torque and leaves more than its noise.
+    """
 
     values: list[BenchValue]
     why: str = ""
+    close: bool = False
 
 
 class LoopFit(NamedTuple):
@@ -60,9 +65,9 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
     if found is None:
         return ControlValues([], "no set-points are recorded, or no gains reproduce the torque command")
     loop = found.law
+    torque, command = (recording.columns.get(name) for name in (names.torque, names.torque_command))
+    measured = command is None or (torque is not None and np.array_equal(command, torque))
     if loop.left > REPLAYED:
-        torque, command = (recording.columns.get(name) for name in (names.torque, names.torque_command))
-        measured = command is None or (torque is not None and np.array_equal(command, torque))
         stands_for_it = "; its command is not recorded, the measured torque stands for it" if measured else ""
         return ControlValues([], f"the best cascaded law leaves {_left(loop)}{stands_for_it}")
     late_rows, error_rows = loop.settings.feedback_rows, loop.errors.feedback_rows
@@ -74,7 +79,8 @@ def loop_values(recording: Recording, ratio_m_rad: float) -> ControlValues:
             "velocity instead, give its gains and velocity_filter_time_constant_s",
         )
     feedback = [_feedback(found)] if _has_two(recording) else []
-    return ControlValues([*feedback, *_bench_values(loop, recording.kind, period_s)])
+    close = measured and torque is not None and loop.left_of_command * np.std(torque) > SURE * white_noise(torque)
+    return ControlValues([*feedback, *_bench_values(loop, recording.kind, period_s)], close=bool(close))
 
 
 def _has_two(recording: Recording) -> bool:

@@ -232,7 +232,10 @@ def fit_plain_model(
         if abs(timed[_LOGGED].value) < 0.1 * timed[_LOGGED].std_error:
             break
     again = structure(early_rows)
-    if not (abs(early_rows) > SIGMAS * timed[_LOGGED].std_error and again.held_out < best.held_out):
+    error_rows = timed[_LOGGED].std_error
+    if abs(early_rows) > SIGMAS * error_rows and again.held_out >= best.held_out:
+        error_rows = float(np.hypot(error_rows, early_rows))  # refuted by held-out rows
+    if not (abs(early_rows) > SIGMAS * error_rows):
         again, early_rows = best, 0.0
 
     def final(names: Sequence[str]) -> LinearFit:
@@ -249,7 +252,7 @@ def fit_plain_model(
         return fit if len(names) == len(MOTION) or fit.differs(names[len(MOTION) :]) else final(MOTION)
 
     fit = final([name for name in again.names if name not in _LAW])
-    return PlainModel(fit, slowest, load_ratio, early_rows, timed[_LOGGED].std_error)
+    return PlainModel(fit, slowest, load_ratio, early_rows, error_rows)
 
 
 def _far(data: Sequence[MotionData], slowest: SlowestSliding, load_ratio: float | None) -> int:

@@ -26,6 +26,7 @@ from hil.importing.stamp_columns import (
 )
 
 SAME = 0.01  # relative deviation of two clocks of the same rows
+_RATE_UNITS = {"hz": 1.0, "khz": 1e3}
 _INTERVAL = 0.01  # relative deviation of the intervals of an even clock
 
 
@@ -187,8 +188,12 @@ def _written_rate(table: ForeignTable) -> tuple[float, str] | None:
     told = table.constants.get(Constant.RATE)
     if told and _plausible(told.value):
         return told.value, f"period from the line {told.text!r}"
-    for name, value in table.scalars.items():
+    holders = {name.rpartition(".")[0] for name in table.columns}  # a rate beside the signals is theirs
+    for name, value in sorted(table.scalars.items(), key=lambda one: one[0].rpartition(".")[0] not in holders):
         plain = name.rpartition(".")[2].lower()
+        stem, _, unit = plain.rpartition("_")
+        if stem in lexicon().scalars.rate and unit in _RATE_UNITS:
+            plain, value = stem, _RATE_UNITS[unit] * value
         if plain in lexicon().scalars.rate and _plausible(value):
             return value, f"scalar {name} of the file"
         if plain in lexicon().scalars.period and _plausible(1.0 / (value or 1e9)):

@@ -41,9 +41,10 @@ def choose_efforts(
 
     A column that the motion explains hardly or far less than another one is none. Of the others a torque or force comes
     before a current, a whole one before a part such as friction, then the one that the motion explains better. A motor
-    that turns makes no force: beside its speed a force is one that was measured elsewhere.
+    that turns makes a torque: where one is named, a force beside its speed is measured elsewhere.
     """
-    found, turns = Efforts(), any(one.unit == "rpm" for one in labels.values())
+    found = Efforts()
+    makes_torque = any(labels[name].si == "N m" for name in names) and _turns(live, labels, moved, period_s)
     shares = {name: max(driven(live[name], moved, period_s).share, 0.0) for name in names}
     best = max(shares.values(), default=0.0)
     for name in list(names):
@@ -53,7 +54,7 @@ def choose_efforts(
 
     def rank(name: str) -> tuple[bool, int, bool, float]:
         one = labels[name]
-        elsewhere = turns and UNITS.get(one.unit or "", ("",))[0] == "N"
+        elsewhere = makes_torque and UNITS.get(one.unit or "", ("",))[0] == "N"
         return one.table or elsewhere, _told(one, constants), one.part, -round(shares[name], 2)
 
     voltage = [name for name in names if (labels[name].unit or labels[name].electric) in ("V", "mV")]
@@ -80,6 +81,12 @@ def choose_efforts(
         if name not in (found.measured, found.command):
             found.left_out.setdefault(name, "another torque, force, current or voltage")
     return found
+
+
+def _turns(live: dict[str, FloatArray], labels: dict[str, Label], moved: MeasuredMotion, period_s: float) -> bool:
+    """True if a column is the speed of this motion as that of a motor that turns."""
+    speeds = [name for name, one in labels.items() if UNITS.get(one.unit or "", ("",))[0] == "rad/s" and name in live]
+    return any(derivative_of(live[name], moved, period_s).share > _DERIVED for name in speeds)
 
 
 def better_speed(

@@ -56,8 +56,7 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     given = [one for line in _without_products(list(lines)) for one in _statements(line)]
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
-        phrase, _ = _unit_of_name(re.split(r"[./]", name)[-1])  # without the struct or group that holds it
-        given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}", phrase))
+        given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}", words))
     found: dict[tuple[bool, Constant], list[HeaderValue]] = {}
     for one in given:
         units = one.units if any(one.units) else (*one.units, None)

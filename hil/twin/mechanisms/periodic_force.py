@@ -15,7 +15,7 @@ from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
-_LEAST_WAVES = 3.3  # in the part that is not held out: two thirds of five in the recording, fewer are a drift
+_LEAST_WAVES = 3.3  # two thirds of five, where a third is held out: fewer are a drift
 _OWN = 0.5  # share of the motion's energy above which the motion is a swing of this line
 
 

@@ -1,4 +1,4 @@
-"""The control law of rows that are ticks of its loop is drafted; that of rows which sample a faster loop is not."""
+"""The control law of rows that are ticks of its loop is drafted, unless its torque is not held from row to row."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from foreign_axis import write
 
-from hil.bench.bench_file import load_bench
+from hil.bench.bench_file import Bench, load_bench
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
 
@@ -38,15 +38,34 @@ def servo(ticks: int) -> dict[str, np.ndarray]:
     return {name: values[::ticks] for name, values in table.items()}
 
 
+def drafted(folder: Path, table: dict[str, np.ndarray]) -> tuple[Bench, str]:
+    import_(write(folder / "log.csv", table), None, folder / "log.parquet", None, None)
+    identify([folder / "log.parquet"], folder / "axis.yaml")
+    return load_bench(folder / "axis.yaml"), (folder / "axis.yaml").read_text()
+
+
 @pytest.mark.parametrize(("ticks", "known"), [(1, True), (2, False)])
 def test_a_law_whose_torque_is_not_held_between_rows_is_not_simulated(tmp_path: Path, ticks: int, known: bool) -> None:
-    import_(write(tmp_path / "log.csv", servo(ticks)), None, tmp_path / "log.parquet", None, None)
-    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
-    bench, text = load_bench(tmp_path / "axis.yaml"), (tmp_path / "axis.yaml").read_text()
+    bench, text = drafted(tmp_path, servo(ticks))
     assert bench.law_known is known
-    assert ("rows are samples of a faster loop" in text) is not known
+    assert ("a faster loop, or recorded late" in text) is not known
     if known:
         assert bench.gains.position_gain_1_s == pytest.approx(POSITION_GAIN_1_S, rel=0.02)
     else:
         gain = text.partition("position_gain_1_s ")[2].partition(",")[0]
         assert float(gain) == pytest.approx(POSITION_GAIN_1_S, rel=0.05)
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_law_of_a_late_torque_is_that_of_its_command(tmp_path: Path, both: bool) -> None:
+    """Without the command the lateness is in the bench, and the gains are told beside it."""
+    table = servo(1)
+    late = np.concatenate([table["torque_Nm"][:1], table["torque_Nm"][:-1]])
+    more = {"torque_set_Nm": table.pop("torque_Nm"), "torque_actual_Nm": late} if both else {"torque_Nm": late}
+    bench, text = drafted(tmp_path, table | more)
+    assert bench.law_known is both
+    if both:
+        assert bench.gains.position_gain_1_s == pytest.approx(POSITION_GAIN_1_S, rel=0.02)
+    else:
+        assert bench.torque_delay_s == pytest.approx(-1.0 / ROWS_HZ, rel=0.02)
+        assert "a faster loop, or recorded late" in text

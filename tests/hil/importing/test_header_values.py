@@ -86,8 +86,6 @@ def test_a_scalar_gives_a_constant_by_its_name_and_two_values_none() -> None:
     assert {one: told.value for one, told in found.items()} == {Constant.RATE: 200.0, Constant.TORQUE: 0.3}
     named = header_values([], {"torque_constant_Nm_per_A": 2.9, "encoder_counts_per_rev": 4194304.0})
     assert {one: told.value for one, told in named.items()} == {Constant.TORQUE: 2.9, Constant.COUNTS: 4194304.0}
-    inside = header_values([], {"rec.Fs_Hz": 4000.0, "pitch/axis2/sample_rate_Hz": 4000.0, "rec.offs": 3.0})
-    assert {one: told.value for one, told in inside.items()} == {Constant.RATE: 4000.0}
     assert header_values(["Torque constant: 0.8 Nm/A", "Motor constant: 0.7 Nm/A"], {}) == {}
 
 

@@ -140,17 +140,29 @@ def test_an_angle_beside_a_length_is_no_set_point(tmp_path: Path, unit: str, siz
     assert ("position_command_m" in found) is not table
 
 
-@pytest.mark.parametrize(("speed", "effort"), [("Drehzahl_1/min", "Moment_Ist_%"), ("Tempo_mm/s", "Kraft_kN")])
-def test_a_force_beside_a_motor_that_turns_is_not_its_own(tmp_path: Path, speed: str, effort: str) -> None:
+@pytest.mark.parametrize(
+    ("speed", "other", "effort"),
+    [
+        ("Drehzahl_1/min", "Moment_Ist_%", "Moment_Ist_%"),
+        ("Winkelgeschwindigkeit_rad/s", "Moment_Ist_%", "Moment_Ist_%"),
+        ("Tempo_mm/s", "Moment_Ist_%", "Kraft_kN"),
+        ("Spindel_Drehzahl_1/min", "Moment_Ist_%", "Kraft_kN"),  # of another motor
+        ("Drehzahl_1/min", "Strom_A", "Kraft_kN"),  # of a drive that computes it
+    ],
+)
+def test_a_force_beside_a_motor_that_turns_is_not_its_own(tmp_path: Path, speed: str, other: str, effort: str) -> None:
     """A load cell, even where the motion explains it better than the torque of the motor."""
-    noise = np.random.default_rng(3).normal(0.0, 0.2, AXIS["t"].size)
+    random = np.random.default_rng(3)
+    noise, factor = random.normal(0.0, 0.2, AXIS["t"].size), {"1/min": 30.0 / np.pi, "mm/s": 5.0 / np.pi}
     columns = {
         "Zeit_s": AXIS["t"],
         "Lage_Ist_mm": AXIS["x_act"],
-        speed: AXIS["speed"] * (30.0 / np.pi if "min" in speed else 10.0 / (2.0 * np.pi)),
-        "Moment_Ist_%": 10.0 * (AXIS["torque"] + noise),
+        speed: AXIS["speed"] * factor.get(speed.rpartition("_")[2], 1.0),
+        other: 10.0 * (AXIS["torque"] + noise),
         "Kraft_kN": 0.6 * AXIS["torque"],
     }
+    if "Spindel" in speed:
+        columns[speed] = random.normal(3000.0, 5.0, AXIS["t"].size)
     chosen = [one.entry["column"] for one in draft_map(write(tmp_path / "log.csv", columns)).channels]
     assert effort in chosen
-    assert not {"Moment_Ist_%", "Kraft_kN"} - {effort} & set(chosen)
+    assert not {other, "Kraft_kN"} - {effort} & set(chosen)

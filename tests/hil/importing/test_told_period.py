@@ -119,3 +119,13 @@ def test_the_drafted_map_imports_by_that_period(tmp_path: Path) -> None:
     recording = import_recording(tmp_path / "log.txt", tmp_path / "map.yaml")
     assert recording.period_s == pytest.approx(4e-3)
     np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "rate"), [("rec.Fs_Hz", 4000.0), ("rec.sample_rate_kHz", 2.0), ("Fs_Hz", 4000.0)])
+def test_a_rate_in_the_struct_of_the_signals_is_the_clock(tmp_path: Path, name: str, rate: float) -> None:
+    """Before that of another struct."""
+    struct = {"angle_deg": DEG, "torque_Nm": TORQUE}
+    holder, _, last = name.rpartition(".")
+    values = {"gps": {"fs": 5.0}, "rec": struct | ({last: rate} if holder else {})} | ({} if holder else {last: rate})
+    savemat(tmp_path / "log.mat", values)
+    assert draft_map(tmp_path / "log.mat").clock.rate_hz == pytest.approx(1e3 * rate if "kHz" in name else rate)

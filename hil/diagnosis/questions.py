@@ -21,7 +21,8 @@ _ROWS = 4.0  # per period of a line: less is an alias
 _MOST_PERIODS = 4000  # of a line over the travel
 _SEEN = 4.0  # bins of the position per period, from which they show it
 POSITION, SPEED, OFFSET = "position", "speed", "offset"
-LATENESS = "lateness"  # of the recorded torque: a coefficient that may change, as those of the plain model
+# Of the recorded torque, a coefficient that may change as those of the plain model; and of the second encoder.
+LATENESS, ENCODER_LATENESS = "lateness", "encoder lateness"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +120,17 @@ def change_over_time(
     if steady and not (moment and moment.course.p <= steady.course.p):
         return steady
     return moment
+
+
+def clocks_of_encoders(data: Dataset, parts: Sequence[ResidualSeries]) -> SteadyChange | None:
+    """How the lateness of the second encoder changes steadily, beside its ratio and datum; None where nothing tells."""
+    ratio = data.bench.axis.ratio_m_rad
+    motions = [measured_motion(run).moved for run in data.runs]
+    columns = [
+        {ENCODER_LATENESS: -ratio * one.velocity, "ratio": ratio * one.position, "datum": np.ones(one.position.size)}
+        for one in motions
+    ]
+    return steady_change(parts, columns, [run.time_s for run in data.runs], ENCODER_LATENESS)
 
 
 def about(change: MomentOfChange | SteadyChange) -> Question:

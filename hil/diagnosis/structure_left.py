@@ -16,11 +16,13 @@ from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.moment_of_change import MomentOfChange, SteadyChange
 from hil.diagnosis.questions import (
+    ENCODER_LATENESS,
     LATENESS,
     OFFSET,
     Question,
     about,
     change_over_time,
+    clocks_of_encoders,
     everywhere,
     folded,
     over_time,
@@ -45,6 +47,7 @@ _COEFFICIENTS = {
     "sine": ("the torque over the sine of the angle", {}),
     "cosine": ("the torque over the cosine of the angle", {}),
     LATENESS: ("the delay of the recorded torque", dict.fromkeys(("N m", "N", "V"), "s")),
+    ENCODER_LATENESS: ("the delay of the second encoder", dict.fromkeys(("N m", "N", "V"), "s")),
 }
 _RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that shows it
 
@@ -111,10 +114,12 @@ def _changed(change: MomentOfChange, drive_unit: str) -> str:
 
 
 def _apart(steady: SteadyChange) -> str:
-    """Say that the delay of the torque changes steadily."""
+    """Say that the delay of the torque, or of the second encoder, changes steadily."""
     way, late_s = "later" if steady.rate > 0.0 else "earlier", abs(steady.rate) * steady.duration_s
+    of_torque = steady.coefficient == LATENESS
+    clocks, what = ("torque and position", "torque") if of_torque else ("both encoders", "second encoder")
     return (
-        f"the clocks of torque and position run apart by {digits(1e6 * abs(steady.rate))} ppm: at the end the torque "
+        f"the clocks of {clocks} run apart by {digits(1e6 * abs(steady.rate))} ppm: at the end the {what} "
         f"is recorded {quantity(late_s, 's')} {way} than at the begin"
     )
 
@@ -244,9 +249,12 @@ def _dependences(
     if found := structure(of_whole, question.values, question.bins):
         found = replace(found, p=max(found.p, slow(of_whole, question.values, found)))
         yield Dependence(channel, question, found, found.energy / all_of_it, found.energy / least, None)
-    if channel == TORQUE and one_way and (change := change_over_time(whole, of_whole, plain)):
-        found = change.course
-        yield Dependence(channel, about(change), found, min(found.energy / all_of_it, 1.0), found.energy / least, None)
+    if not one_way:
+        return
+    torque = channel == TORQUE
+    if change := change_over_time(whole, of_whole, plain) if torque else clocks_of_encoders(whole, of_whole):
+        found, enough = change.course, least if torque else CRITERIA.material * least  # counts make no such course
+        yield Dependence(channel, about(change), found, min(found.energy / all_of_it, 1.0), found.energy / enough, None)
 
 
 def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:

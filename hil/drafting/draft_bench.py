@@ -119,12 +119,17 @@ def _is_sampled(recording: Recording, plant: PlantValues) -> bool:
 
 
 def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None:
-    """Delay of a torque whose rows are samples, of which the twin holds each until the next; None where not told."""
-    if plant.early_s is None or not plant.early_s.value or rows_are_ticks(recording):
-        return None
+    """Delay of a torque whose rows are samples, of which the twin holds each until the next; None where not told.
+
+    Samples of one instant act half a row before they are held.
+    """
     early = plant.early_s
-    delay_s = early.value - 0.5 * recording.period_s
-    if abs(delay_s) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
+    if early is None or rows_are_ticks(recording):
+        return None
+    period_s = recording.period_s
+    delay_s = early.value - 0.5 * period_s
+    told = early.value or (early.std_error > 0.0 and sure(delay_s / period_s, early.std_error / period_s))
+    if not told or abs(delay_s) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
         return None
     how = f"{delay_in_words(delay_s)}; of it half a row, as each value is held for one"
     return BenchValue("torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", how)

@@ -7,13 +7,14 @@ hypothesis does not reproduce a recording.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench, MechanismEntry
+from hil.identification.block_residuals import blocks, sliding, undelayed
 from hil.identification.coordinates import (
     CHATTER_STEP,
     DELAY,
@@ -29,12 +30,10 @@ from hil.identification.coordinates import (
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
-from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
-from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin, taken_back
+from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Contact, Stage
-from hil.twin.mechanisms.channel_time_skew import delayed
+from hil.twin.mechanism import Contact
 from hil.twin.physics import Active
 
 # Longest internal steps of the twin in a search, fine and coarse: block by block, residuals differ from those at the
@@ -246,8 +245,7 @@ class Hypothesis:
 
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
-        late = tuple(one for one in twin.active if one.form.stage is Stage.CHANNEL)
-        return _undelayed(run, late, (self.resolved.bench.torque_delay_s or 0.0) / run.period_s)
+        return undelayed(twin, run, self.resolved.bench.torque_delay_s or 0.0)
 
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
@@ -256,14 +254,7 @@ class Hypothesis:
 
         The motor rests where it does in `rests`, by default in the run.
         """
-        twin = self.twin(observer_s, fast, run)
-        measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
-        predicted = twin.observe(
-            run.position_command_m, run.velocity_command_m_s, measured, run.start, rest, run.feedforward
-        )
-        residuals = differences(measured, predicted, self.bench, run.evaluated)
-        residuals["command"] = measured.torque_command - predicted.torque_command
-        return residuals | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
+        return blocks(self.twin(observer_s, fast, run), self.resolved.bench, run, rests or run)
 
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
@@ -274,27 +265,21 @@ class Hypothesis:
                 channels = [differences(run.response, self.respond(run), bench, run.evaluated) for run in runs]
             elif data.apart:
                 free = [
-                    self.blocks(one.smooth, data.observer_s, fast, rests=run)
+                    sliding(
+                        self.twin(data.observer_s, fast, one.smooth),
+                        self.resolved.bench,
+                        one.smooth,
+                        run,
+                        one.rows,
+                        data,
+                    )
                     for one, run in zip(data.apart, runs, strict=True)
                 ]
                 channels = [
-                    {
-                        name: np.where(one.rows, values + one.noise[name], one.measured[name])
-                        for name, values in each.items()
-                    }
+                    {name: one.of(name, values) for name, values in each.items()}
                     for one, each in zip(data.apart, free, strict=True)
                 ]
             else:
                 channels = [self.blocks(run, data.observer_s, fast) for run in runs]
             self._done[key] = Residuals(data, tuple(channels))
         return self._done[key]
-
-
-@lru_cache(maxsize=32)  # most parameters of a fit leave the lateness as it is
-def _undelayed(run: Measured, late: tuple[Active, ...], torque_periods: float) -> Response:
-    """Measured channels without the lateness that mechanisms, and a delay of the torque in rows, give them."""
-    channels = taken_back(run.response, late, run.period_s)
-    if not torque_periods:
-        return channels
-    command, torque = (delayed(part, torque_periods) for part in (channels.torque_command, channels.torque))
-    return channels._replace(torque_command=command, torque=torque)

@@ -125,7 +125,7 @@ class ChannelEntries:
                 nominal = told is not None and abs(told.value / lead_m - 1.0) < MATCH
                 draft.lead_m = told.value if told and nominal else float(f"{usual_lead(lead_m):.6g}")
                 draft.lead_how = f"travel of {length} per turn of {name}"
-            elif told and not roles.table:
+            elif told and (not roles.table or self.units[roles.table] == "counts"):
                 draft.lead_m, draft.lead_how = told.value, f"header of the file: {told.text}"
             else:
                 draft.lead_m = ROTARY_LEAD_M
@@ -213,7 +213,7 @@ class ChannelEntries:
             keys |= count
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             per_count = self.per_count / (1.0 if same else abs(factor))
-            lever = (self.draft.lead_m or 0.0) / (2.0 * pi) if motor == "rad" else 1.0
+            lever = (self.draft.lead_m or 0.0) / (2.0 * pi) * UNITS[motor][1] if UNITS[motor][0] == "rad" else 1.0
             per_m = scale_count(1.0 / (per_count * lever)) if lever and channel == "table_position_m" else None
             if per_m is not None and not same:
                 keys |= {"counts_per_m": per_m}

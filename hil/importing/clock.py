@@ -139,14 +139,14 @@ def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
 def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
     """The first column without a known quantity that grows by nearly equal steps, or holds seconds since 1970.
 
-    Row numbers are none.
+    A unit of time counts whatever else the name says, as in cycle_us. Row numbers are none.
     """
     for name, values in table.columns.items():
         steps = np.diff(counted_on(values, range_of(values)))
         if labels[name].quantity is Quantity.UNKNOWN and (whole_seconds(values) or since_1970(values)):
             return [name]
         if (
-            (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter)
+            (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter or labels[name].unit in SECONDS)
             and steps.size
             and np.isfinite(steps).all()
             and steps.min() > 0

@@ -9,6 +9,7 @@ from hil.diagnosis.acceptance import EXPLAINED
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, accepted, examine
 from hil.diagnosis.moment_of_change import MomentOfChange, SteadyChange
+from hil.diagnosis.questions import LATENESS
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.stages import Judged, Tested
 from hil.diagnosis.structure_left import Dependence, like_noise, structure_left
@@ -152,7 +153,8 @@ def told_apart(nominal: Fit) -> bool:
 
 def _is_drift(change: Change, beside: Sequence[Dependence]) -> bool:
     """True if a delay alone differs from part to part, and does so as one of two clocks that run apart."""
-    drifts = any(isinstance(one.question.change, SteadyChange) for one in beside)
+    steady = (one.question.change for one in beside if isinstance(one.question.change, SteadyChange))
+    drifts = any(one.coefficient == LATENESS for one in steady)
     return drifts and {one.name for one in change.summary.parameters} == {DELAY}
 
 

@@ -31,6 +31,14 @@ def test_a_torque_that_is_recorded_late_is_in_the_bench(late_rows: int) -> None:
     assert f"torque is recorded {digits(-1e3 * late.bench.torque_delay_s)} ms after it acts" in late.text
 
 
+def test_samples_of_one_instant_act_half_a_row_before_they_are_held() -> None:
+    """Where the rows are long enough for least squares to tell the two apart."""
+    every = 4
+    period_s = every * float(AXIS["t"][1] - AXIS["t"][0])
+    angle, torque = (AXIS[name][::every] for name in ("angle", "torque"))
+    assert imported(period_s, angle, torque).bench.torque_delay_s == pytest.approx(-0.5 * period_s, abs=0.1 * period_s)
+
+
 @pytest.mark.parametrize("late_rows", [-2, -1, 1, 2])
 def test_slow_rows_with_a_late_torque_make_a_valid_bench(late_rows: int) -> None:
     time_s = 0.3 * np.arange(3000)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_axis import LEAD_M, axis, renamed, write
+from foreign_axis import LEAD_M, axis, csv_text, renamed, write
 
 from hil.importing.draft_map import draft_map
 from hil.importing.map_draft import MapDraft
@@ -110,6 +110,17 @@ def test_counts_of_a_second_encoder_have_the_size_of_a_linear_scale(tmp_path: Pa
     names = {"x_act": "lin_enc[cnt]", "angle": "mot_enc[cnt]", "torque": "torque[Nm]"}
     draft = draft_map(write(tmp_path / "log.csv", renamed(AXIS | scale, t="t[s]", x_set="set[mm]", **names)))
     assert channels(draft)["table_position_m"]["counts_per_m"] == 1e6
+
+
+def test_the_lead_of_the_header_sizes_the_counts_of_a_second_encoder(tmp_path: Path) -> None:
+    turns = {"t": AXIS["t"], "turns": AXIS["angle"] / (2.0 * np.pi), "torque": AXIS["torque"]}
+    turns["scale"] = np.round(AXIS["x_act"] / 5e-3) + 31_000.0
+    columns = renamed(turns, t="time_s", turns="GIRI_MOT", scale="RIGA_CNT", torque="torque_Nm")
+    path = tmp_path / "log.csv"
+    path.write_text(csv_text(columns, ";", above="passo vite 10 mm/giro\n"))
+    draft = draft_map(path)
+    assert draft.lead_m == pytest.approx(LEAD_M)
+    assert channels(draft)["table_position_m"]["counts_per_m"] == pytest.approx(200_000.0)
 
 
 @pytest.mark.parametrize(("name", "factor"), [("pos_m", 20.0), ("pos_nm", 1e-3), ("angle_rev", 400.0)])

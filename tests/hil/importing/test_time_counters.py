@@ -53,6 +53,15 @@ def test_a_counter_of_common_width_is_counted_on(tmp_path: Path, counter: str) -
     np.testing.assert_allclose(recording["torque_n_m"], TORQUE, atol=1e-5)
 
 
+def test_a_column_in_a_unit_of_time_that_grows_evenly_is_the_clock(tmp_path: Path) -> None:
+    """Whatever else its name says."""
+    path = tmp_path / "log.csv"
+    path.write_text(text(4_120_000.0 + 1e6 * T, "cycle_us,angle_rad,torque_Nm"))
+    clock = draft_map(path).clock
+    assert clock.time is not None
+    assert (clock.time.column, clock.time.unit) == ("cycle_us", "us")
+
+
 def test_rows_that_are_lost_where_a_counter_starts_again_stay_lost() -> None:
     stamps = np.delete((2**32 - 20_000 + 5000.0 * np.arange(2000)) % 2**32, [3, 4, 5])
     assert range_of(stamps) == 2**32

@@ -39,6 +39,8 @@ PERIODS = {
     '"V 1.3","dt=20ms"\n': 50.0,
     "период 5 мс\n": 200.0,
     "采样周期 4ms\n": 250.0,
+    "Campionamento 800 Hz, passo vite 10 mm/giro\n": 800.0,
+    "Muestreo: 2 ms\n": 500.0,
 }
 
 

@@ -7,14 +7,13 @@ hypothesis does not reproduce a recording.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench, MechanismEntry
-from hil.identification.block_residuals import blocks, sliding, undelayed
 from hil.identification.coordinates import (
     CHATTER_STEP,
     DELAY,
@@ -30,10 +29,12 @@ from hil.identification.coordinates import (
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
 from hil.identification.residuals import Residuals, differences
+from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
-from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin
+from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin, taken_back
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Contact
+from hil.twin.mechanism import Contact, Stage
+from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.physics import Active
 
 # Longest internal steps of the twin in a search, fine and coarse: block by block, residuals differ from those at the
@@ -245,7 +246,8 @@ class Hypothesis:
 
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
-        return undelayed(twin, run, self.resolved.bench.torque_delay_s or 0.0)
+        late = tuple(one for one in twin.active if one.form.stage is Stage.CHANNEL)
+        return _undelayed(run, late, (self.resolved.bench.torque_delay_s or 0.0) / run.period_s)
 
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
@@ -254,7 +256,14 @@ class Hypothesis:
 
         The motor rests where it does in `rests`, by default in the run.
         """
-        return blocks(self.twin(observer_s, fast, run), self.resolved.bench, run, rests or run)
+        twin = self.twin(observer_s, fast, run)
+        measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
+        predicted = twin.observe(
+            run.position_command_m, run.velocity_command_m_s, measured, run.start, rest, run.feedforward
+        )
+        residuals = differences(measured, predicted, self.bench, run.evaluated)
+        residuals["command"] = measured.torque_command - predicted.torque_command
+        return residuals | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
 
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
@@ -265,21 +274,27 @@ class Hypothesis:
                 channels = [differences(run.response, self.respond(run), bench, run.evaluated) for run in runs]
             elif data.apart:
                 free = [
-                    sliding(
-                        self.twin(data.observer_s, fast, one.smooth),
-                        self.resolved.bench,
-                        one.smooth,
-                        run,
-                        one.rows,
-                        data,
-                    )
+                    self.blocks(one.smooth, data.observer_s, fast, rests=run)
                     for one, run in zip(data.apart, runs, strict=True)
                 ]
                 channels = [
-                    {name: one.of(name, values) for name, values in each.items()}
+                    {
+                        name: np.where(one.rows, values + one.noise[name], one.measured[name])
+                        for name, values in each.items()
+                    }
                     for one, each in zip(data.apart, free, strict=True)
                 ]
             else:
                 channels = [self.blocks(run, data.observer_s, fast) for run in runs]
             self._done[key] = Residuals(data, tuple(channels))
         return self._done[key]
+
+
+@lru_cache(maxsize=32)  # most parameters of a fit leave the lateness as it is
+def _undelayed(run: Measured, late: tuple[Active, ...], torque_periods: float) -> Response:
+    """Measured channels without the lateness that mechanisms, and a delay of the torque in rows, give them."""
+    channels = taken_back(run.response, late, run.period_s)
+    if not torque_periods:
+        return channels
+    command, torque = (delayed(part, torque_periods) for part in (channels.torque_command, channels.torque))
+    return channels._replace(torque_command=command, torque=torque)

@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from hil.identification.block_residuals import sliding
 from hil.identification.dataset import Dataset, NoiseApart
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import Measured
@@ -27,13 +26,9 @@ def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Data
     """The recordings of a data set with their noise as it goes through the twin of a reference."""
     apart = []
     for run, smooth in zip(data.runs, smoothed_runs(data.runs, plain), strict=True):
-        motion = measured_motion(run)
-        rows = motion.sliding(plain.slowest)
-        twin, bench = reference.twin(data.observer_s, run=run), reference.resolved.bench
-        with_noise = sliding(twin, bench, run, run, rows, data, motion.window)
-        free = sliding(twin, bench, smooth, run, rows, data)
-        noise = {name: values - free[name] for name, values in with_noise.items()}
-        apart.append(NoiseApart(smooth, rows, noise, reference.blocks(run, data.observer_s)))
+        measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
+        noise = {name: measured[name] - free[name] for name in measured}
+        apart.append(NoiseApart(smooth, measured_motion(run).sliding(plain.slowest), noise, measured))
     return replace(data, apart=tuple(apart))
 
 

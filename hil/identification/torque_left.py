@@ -17,24 +17,23 @@ between stretches that slide, where the sign of the velocity is not known, it go
 """
 
 import math
-from collections.abc import Collection, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Collection, Sequence
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
+from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import matched, noise_gains
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.inverse_twin import as_observed, at_each_tick, is_rigid, lacking
 from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, SlowestSliding, fit_plain_model, motion_data
 from hil.identification.structure import ResidualSeries
-from hil.identification.twin_deviation import held_on_motor, mechanical
-from hil.twin.axis import Twin
+from hil.identification.twin_deviation import held_on_motor
 
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
 # Some rows that slide by the measured motion may not by that of a twin: quantile of the others; share of them that is
@@ -102,9 +101,13 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
     found = []
     for run in data.runs:
         motion = measured_motion(run)
-        rows = motion.sliding(model.slowest)
-        missing = motion.torque - model.predict(motion.moved)
-        found.append(as_observed(missing, rows, run.period_s / data.observer_s)[rows])
+        rows = np.flatnonzero(motion.sliding(model.slowest))
+        missing = (motion.torque - model.predict(motion.moved))[rows]
+        a = run.period_s / data.observer_s
+        if rows.size:
+            bridged = np.interp(np.arange(run.motor.size), rows, missing)
+            seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], bridged)
+            found.append(np.asarray(seen, dtype=np.float64)[rows])
     return _share(found, data, model.slowest, deviation)
 
 
@@ -126,32 +129,18 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast
 
     Rows in which the axis slides count. `fast`: with the internal steps of a search.
     """
-    return [_needed(hypothesis, run, data.observer_s, plain, fast) for run in data.runs]
+    found = []
+    for run in data.runs:
+        motion = measured_motion(run)
+        rows = motion.sliding(plain.slowest)
+        innovation_with = partial(_innovation, hypothesis, run, data.observer_s, fast)
+        lacking, sticks = _lacking(innovation_with, run, motion, rows)
+        found.append(ResidualSeries(-lacking, rows, sticks))
+    return found
 
 
-def _needed(hypothesis: Hypothesis, run: Measured, observer_s: float, plain: PlainModel, fast: bool) -> ResidualSeries:
-    """Torque that the motion of a run needs beyond that of a twin: by inverse dynamics, with springs by the innovation.
-
-    On a rigid axis what mechanisms with states between the ticks change is the difference of two innovations.
-    """
-    motion, twin = measured_motion(run), hypothesis.twin(observer_s, fast, run)
-    rows = motion.sliding(plain.slowest)
-    driven = mechanical(twin)
-    known = at_each_tick(driven)
-    if not is_rigid(twin):
-        missing, sticks = _missing(hypothesis, driven, run, motion, rows)
-        return ResidualSeries(-missing, rows, sticks)
-    measured = hypothesis.undelayed(twin, run)
-    measured = measured._replace(torque_command=measured.torque)
-    left = -as_observed(lacking(known, measured, run, motion.window), rows, run.period_s / observer_s)
-    if len(known.active) == len(driven.active):
-        return ResidualSeries(left, rows)
-    (with_it, sticks), (without, _) = (_missing(hypothesis, one, run, motion, rows) for one in (driven, known))
-    return ResidualSeries(left - with_it + without, rows, sticks)
-
-
-def _missing(
-    hypothesis: Hypothesis, twin: Twin, run: Measured, motion: MotionData, rows: NDArray[np.bool_]
+def _lacking(
+    innovation_with: Callable[[FloatArray], FloatArray], run: Measured, motion: MotionData, rows: NDArray[np.bool_]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,), and rows in which it sticks without.
 
@@ -164,8 +153,8 @@ def _missing(
     more, added, noise = np.zeros(run.motor.size), _ADDED * deviation * way, run.noise.torque
     found, stuck, before = np.full(run.motor.size, np.nan), rows, np.count_nonzero(rows) + 1
     for _ in range(_AGAIN):
-        innovation = _innovation(hypothesis, twin, run, more)
-        moved = (innovation - _innovation(hypothesis, twin, run, more + added)) * way
+        innovation = innovation_with(more)
+        moved = (innovation - innovation_with(more + added)) * way
         scale = float(np.quantile(moved[rows], _SLIDE)) if rows.any() else 0.0
         sticks = rows & (moved < 0.5 * scale)
         if not scale > 0.0 or np.count_nonzero(sticks) >= before:
@@ -179,9 +168,9 @@ def _missing(
     return np.asarray(found, dtype=np.float64), stuck
 
 
-def _innovation(hypothesis: Hypothesis, twin: Twin, run: Measured, more: FloatArray) -> FloatArray:
+def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray) -> FloatArray:
     """Measured less simulated motor position (n,) of a twin held on it, with more torque (n,) than the measured one."""
-    measured, held = held_on_motor(hypothesis, twin, run, more)
+    measured, held = held_on_motor(hypothesis, run, observer_s, more, fast)
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 

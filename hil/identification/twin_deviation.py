@@ -30,7 +30,7 @@ from hil.identification.noise_floor import rms
 from hil.identification.residual_scales import inertia
 from hil.identification.residuals import differences
 from hil.identification.terms import Term
-from hil.twin.axis import Response, Twin
+from hil.twin.axis import Response
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.physics import Active
@@ -104,8 +104,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
     if run.observability.torque_and_command:
         drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], evaluated)
         blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
-    twin = mechanical(hypothesis.twin(data.observer_s, run=run))
-    held = differences(*held_on_motor(hypothesis, twin, run), hypothesis.bench, evaluated)
+    held = differences(*held_on_motor(hypothesis, run, data.observer_s), hypothesis.bench, evaluated)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
     motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], evaluated)
     inputs = f"measured {name}, held on the measured motor position"
@@ -121,21 +120,20 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
 
 
 def held_on_motor(
-    hypothesis: Hypothesis, twin: Twin, run: Measured, more: FloatArray | float = 0.0
+    hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray | float = 0.0, fast: bool = False
 ) -> tuple[Response, Response]:
-    """Measured channels, lateness undone, and those of a twin held on the motor, driven by the measured torque.
+    """Measured channels, lateness undone, and those of the twin held on the motor, driven by the measured torque.
 
-    `twin`: of the hypothesis, see `mechanical`. It gets `more` torque (n,), by default none.
+    It gets `more` torque (n,), by default none. `fast`: with the internal steps of a search.
+    Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
     """
-    measured = hypothesis.undelayed(hypothesis.twin(run=run), run)
+    twin = hypothesis.twin(observer_s, fast, run)
+    measured = hypothesis.undelayed(twin, run)
+    mechanical = tuple(active for active in twin.active if not in_measured_torque(active))
     driven = measured.torque + more
     inputs = measured._replace(torque=driven, torque_command=driven)
-    return measured, twin.observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
-
-
-def mechanical(twin: Twin) -> Twin:
-    """The twin without mechanisms of the drive and of the recorded channels: the measured torque contains them."""
-    return replace(twin, active=tuple(active for active in twin.active if not in_measured_torque(active)))
+    held = replace(twin, active=mechanical).observe(run.position_command_m, run.velocity_command_m_s, inputs, run.start)
+    return measured, held
 
 
 def in_measured_torque(of: Term | Active) -> bool:

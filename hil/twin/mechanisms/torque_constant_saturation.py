@@ -1,14 +1,12 @@
 """Saturation of the torque constant: torque per ampere falls with current."""
 
 import math
-from collections.abc import Sequence
 
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
-from hil.twin.scene import AxisFacts
 
 
 @njit
@@ -19,11 +17,6 @@ def _saturating_torque_constant(value: float, at: Moment, parameters: Row, memor
     most = 1.0 / math.sqrt(3.0 * falling)  # more current gives no more torque from here on
     held = min(max(value, -most), most)
     return held * (1.0 - falling * held * held)
-
-
-def _valid(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that the current gives more torque as it grows in at least half of the motion."""
-    return not values[0] > 0.0 or axis.driven(1.0 / math.sqrt(3.0 * values[0])) < 0.5
 
 
 MECHANISM = Mechanism(
@@ -37,6 +30,5 @@ MECHANISM = Mechanism(
     text=Text(
         "The torque constant falls with current: T = u (1 - c u^2), c = {coefficient_1_n2_m2}.", Picture.CHARACTERISTIC
     ),
-    can_be=_valid,
     search=SearchHints(lambda s: [(0.02 / s.peak_torque**2,)], lambda a: (0.1 / (3.0 * a.rated_torque) ** 2,)),
 )

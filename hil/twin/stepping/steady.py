@@ -1,9 +1,8 @@
-"""Torques of an axis whose motion is given, from the stages of the twin.
+"""Torque of an axis in steady motion: what a constant speed through a place needs, from the stages of the twin.
 
     needed   u = drive^-1 (T0 + sign Fc + drag + c v - table force x ratio - other torque on the motor)
-    net      J a = drive(u) + other torque on the motor + table force x ratio - T0 - sign Fc - drag - c v
 
-`steady`: late and hysteretic effects are at their begin, each place is asked with an empty memory.
+Late and hysteretic effects are at their begin: each place is asked with an empty memory.
 """
 
 import numpy as np
@@ -20,7 +19,6 @@ from hil.twin.stepping.transmission import moment
 _scale, _bias = stages.friction_scale, stages.bias
 _share, _viscous_share = stages.table_share, stages.table_viscous_share
 _current, _torque, _motor_torque, _table_force = stages.current, stages.torque, stages.motor_torque, stages.table_force
-_motor_reading = stages.motor_reading
 _Effects = stages.Effects
 INVERSIONS, INVERTED = 30, 1e-9  # of the drive, whose torque constant may vary by half of itself: steps, error
 
@@ -61,38 +59,6 @@ def steady(positions, speed, time_s, constants, modes, values, codes, memory):  
                 break
         needed[k] = command
     return needed, on_table
-
-
-@njit(cache=True, nogil=True, **COMPILE)
-def net(positions, speeds, commands, pushes, constants, modes, values, codes, memory):  # type: ignore[no-untyped-def]
-    """Torque (n,) that is left to accelerate a rigid axis which slides, tick by tick, at motor positions and speeds
-    (n,) under torque commands (n,) and forces on its table (n,)."""
-    c, own = constants[0], memory[0]
-    effects = _Effects(values, codes[0], own.mechanisms)
-    left = np.empty(positions.size)
-    for k in range(positions.size):
-        speed = speeds[k]
-        at = moment(c, own.clock, 0.0, c.period, positions[k], speed, positions[k] * c.ratio)
-        turned = _torque(_current(commands[k], at, effects), at, effects)
-        scale = max(_scale(1.0, at, effects), 0.0)
-        bound, drag = level(c, scale, under(at, turned, speed), effects)
-        sign = 1.0 if speed > 0.0 else -1.0 if speed < 0.0 else 0.0
-        resisting = _bias(0.0, at, effects) + sign * bound + drag + scale * c.viscous * speed
-        left[k] = _motor_torque(turned, at, effects) + _table_force(pushes[k], at, effects) * c.ratio - resisting
-        own.clock += c.period
-    return left
-
-
-@njit(cache=True, nogil=True, **COMPILE)
-def readings(positions, constants, modes, values, codes, memory):  # type: ignore[no-untyped-def]
-    """Readings (n,) of the motor's encoder, tick by tick, at motor positions (n,)."""
-    c, own = constants[0], memory[0]
-    effects, read_as = _Effects(values, codes[0], own.mechanisms), np.empty(positions.size)
-    for k in range(positions.size):
-        at = moment(c, own.clock, 0.0, c.period, positions[k], 0.0, positions[k] * c.ratio)
-        read_as[k] = _motor_reading(positions[k], at, effects)
-        own.clock += c.period
-    return read_as
 
 
 @njit(cache=True, nogil=True, **COMPILE)

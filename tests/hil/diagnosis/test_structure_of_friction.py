@@ -8,7 +8,6 @@ import numpy as np
 from foreign_axis import INERTIA_KG_M2, axis, write
 
 from hil.bench.bench_file import load_bench
-from hil.bench.turning_axes import RotaryTwoMass
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.diagnosis.preparation.prepare import prepare
@@ -24,10 +23,10 @@ ROW = 20  # rows of a slow recording
 DRAG_N_M, PLAY_RAD, RAMP_RAD = 0.15, 12.0, 1.0
 
 
-def left_by(extra: np.ndarray, folder: Path, columns: dict[str, np.ndarray] = COLUMNS) -> list[Dependence]:
+def left_by(extra: np.ndarray, folder: Path) -> list[Dependence]:
     """Torque that the twin of the drafted bench leaves, for an axis with `extra` torque (n,) added."""
     folder.mkdir()
-    table = {"time_s": columns["t"], "motor_angle_rad": columns["angle"], "torque_Nm": columns["torque"] + extra}
+    table = {"time_s": COLUMNS["t"], "motor_angle_rad": COLUMNS["angle"], "torque_Nm": COLUMNS["torque"] + extra}
     import_(write(folder / "log.csv", table), None, folder / "log.parquet", None, None)
     identify([folder / "log.parquet"], folder / "axis.yaml")
     prepared = prepare([read_recording(folder / "log.parquet")], [], load_bench(folder / "axis.yaml"))
@@ -46,13 +45,12 @@ def test_friction_that_grows_with_the_load_is_seen(tmp_path: Path) -> None:
 
 def test_what_is_dragged_after_a_free_play_is_seen_from_the_reversal_on(tmp_path: Path) -> None:
     """A cover that the axis carries along from the end of a play: it stays behind after each reversal."""
-    columns = axis(2 * COLUMNS["t"].size)
-    cover, drag = columns["angle"][0], []
-    for angle in columns["angle"]:
+    cover, drag = COLUMNS["angle"][0], []
+    for angle in COLUMNS["angle"]:
         apart = float(np.clip(angle - cover, -PLAY_RAD - RAMP_RAD, PLAY_RAD + RAMP_RAD))
         cover = angle - apart
         drag.append(np.sign(apart) * max(abs(apart) - PLAY_RAD, 0.0) / RAMP_RAD)
-    found = {one.question.name: one for one in left_by(DRAG_N_M * np.array(drag), tmp_path / "drag", columns)}
+    found = {one.question.name: one for one in left_by(DRAG_N_M * np.array(drag), tmp_path / "drag")}
     seen = found["distance from the last reversal"]
     forwards = slice(int(np.searchsorted(seen.found.edges, seen.question.by_direction)) + 1, None)
     starts = seen.found.edges[forwards][:-1] - seen.question.by_direction
@@ -73,19 +71,14 @@ def test_torque_that_a_drive_lacks_where_it_makes_much_power_is_seen(tmp_path: P
 
 
 def test_rows_in_which_the_twin_sticks_are_known(tmp_path: Path) -> None:
-    """A twin with a spring and too much friction stands still in slow rows where its axis is slow, until pushed."""
+    """In slow rows a twin with too much friction stands still where its axis is slow, until more torque moves it."""
     left_by(np.zeros(COLUMNS["t"].size), tmp_path / "plain")
     bench = load_bench(tmp_path / "plain" / "axis.yaml")
     table = {"time_s": COLUMNS["t"], "motor_angle_rad": COLUMNS["angle"], "torque_Nm": COLUMNS["torque"]}
     slow = {name: values[::ROW] for name, values in table.items()}
     import_(write(tmp_path / "slow.csv", slow), None, tmp_path / "slow.parquet", None, None)
-    half = 0.5 * bench.axis.inertia_kg_m2
-    two = RotaryTwoMass(
-        motor_inertia_kg_m2=half, load_inertia_kg_m2=half, stiffness_n_m_rad=1e4 * half,
-        coulomb_torque_n_m=2.0 * bench.axis.coulomb_torque_n_m,
-        viscous_torque_n_m_s_rad=bench.axis.viscous_torque_n_m_s_rad,
-    )  # fmt: skip
-    owner = bench.model_copy(update={"axis": two}).sampled(ROW * 1e-3)
+    more = bench.axis.model_copy(update={"coulomb_torque_n_m": 2.0 * bench.axis.coulomb_torque_n_m})
+    owner = bench.model_copy(update={"axis": more}).sampled(ROW * 1e-3)
     data = prepare([read_recording(tmp_path / "slow.parquet")], [], owner).train
     plain = fit_plain(data)
     assert plain is not None

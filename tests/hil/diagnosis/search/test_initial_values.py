@@ -200,13 +200,6 @@ def test_a_zone_is_a_part_of_the_travel() -> None:
         assert BY_ID["local_friction"].is_claimable((0.5, *zone), 0, facts) is told
 
 
-@pytest.mark.parametrize("share", [0.2, 0.8])
-def test_a_limit_is_reached_in_less_than_half_of_the_motion(share: float) -> None:
-    facts = replace(axis_facts(OWNER), held_s=lambda level: 1.0, driven=lambda level: share)
-    for effect, value in (("torque_saturation", 2.0), ("torque_constant_saturation", 0.1)):
-        assert BY_ID[effect].is_claimable((value,), 0, facts) is (share < 0.5)
-
-
 def test_a_few_waves_in_the_whole_recording_are_a_drift() -> None:
     facts = axis_facts(OWNER, [take(concealed_run(OWNER, {}), OWNER)])
     for waves, told in ((8.0, True), (3.0, False)):

@@ -14,9 +14,8 @@ from scipy.stats import t as student
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.prepare import prepare
-from hil.diagnosis.search.coefficient import first_coefficient, log_tail
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import log_chance_below_noise, log_chance_of_shape, shown
+from hil.diagnosis.search.shape import _first_coefficient, _log_tail, log_chance_below_noise, log_chance_of_shape, shown
 from hil.identification.estimator import Fit
 from hil.identification.laps import Laps
 from hil.identification.nominal_fit import fit_nominal_parameters
@@ -74,7 +73,7 @@ def test_the_tail_of_students_t_is_told_where_it_is_no_floating_point_number(rat
 
     width = 1.0 / max(1.0, ratio * (free + 1.0) / (free + ratio**2))
     area = width * quad(lambda way: over_density(width * way), 0.0, math.inf, limit=400)[0]
-    assert log_tail(ratio, free) == pytest.approx(student.logpdf(ratio, free) + math.log(area), abs=0.02)
+    assert _log_tail(ratio, free) == pytest.approx(student.logpdf(ratio, free) + math.log(area), abs=0.02)
 
 
 def test_noise_that_repeats_from_lap_to_lap_tells_no_more_than_one_lap() -> None:
@@ -85,9 +84,9 @@ def test_noise_that_repeats_from_lap_to_lap_tells_no_more_than_one_lap() -> None
     ratios = {"repeats": list[float](), "not told": list[float](), "does not": list[float]()}
     for _ in range(120):
         same, other = np.tile(rng.standard_normal(lap), 2), rng.standard_normal(2 * lap)
-        ratios["repeats"].append(first_coefficient(matrix, same, [rows], [laps])[1])
-        ratios["not told"].append(first_coefficient(matrix, same, [rows], [None])[1])
-        ratios["does not"].append(first_coefficient(matrix, other, [rows], [laps])[1])
+        ratios["repeats"].append(_first_coefficient(matrix, same, [rows], [laps])[1])
+        ratios["not told"].append(_first_coefficient(matrix, same, [rows], [None])[1])
+        ratios["does not"].append(_first_coefficient(matrix, other, [rows], [laps])[1])
     spread = {name: float(np.std(values)) for name, values in ratios.items()}
     assert spread["repeats"] == pytest.approx(1.0, abs=0.15)
     assert spread["does not"] == pytest.approx(1.0, abs=0.15)

@@ -115,7 +115,7 @@ def test_counts_of_a_second_encoder_have_the_size_of_a_linear_scale(tmp_path: Pa
 def test_the_lead_of_the_header_sizes_the_counts_of_a_second_encoder(tmp_path: Path) -> None:
     turns = {"t": AXIS["t"], "turns": AXIS["angle"] / (2.0 * np.pi), "torque": AXIS["torque"]}
     turns["scale"] = np.round(AXIS["x_act"] / 5e-3) + 31_000.0
-    columns = renamed(turns, t="time_s", turns="GIRI_MOT", scale="RIGA_CNT", torque="torque_Nm")
+    columns = renamed(turns, t="time_s", turns="motor_pos_rev", scale="scale_cnt", torque="torque_Nm")
     path = tmp_path / "log.csv"
     path.write_text(csv_text(columns, ";", above="passo vite 10 mm/giro\n"))
     draft = draft_map(path)

@@ -40,7 +40,7 @@ def test_time_stamps_that_are_late_now_and_then_are_no_force(tmp_path: Path, lat
 
 @pytest.mark.parametrize(("waves", "may_be"), [(4.5, False), (5.5, True)])
 def test_a_force_needs_five_waves_in_the_recording(tmp_path: Path, waves: float, may_be: bool) -> None:
-    """Of which the part that is not held out has fewer."""
+    """The part for training has fewer."""
     columns = axis(24_000)
     line_hz = waves / float(columns["t"][-1])
     torque = columns["torque"] - 0.1 * np.sin(2.0 * np.pi * line_hz * columns["t"])

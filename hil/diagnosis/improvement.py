@@ -23,6 +23,8 @@ def improvement(result: Result) -> str:
     )
     where = "held-out" if entry.validate_ else "these"
     what = f"With it the residual of the {spoken(name)} on {where} recordings"
+    if before == after:
+        return f"{what} stays at {after} rms."
     if found.after_rms >= found.best_before_rms:
         return f"{what} does not fall: {after} instead of {before} rms."
     if not _above(found.after_rms, found):

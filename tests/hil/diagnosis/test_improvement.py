@@ -26,6 +26,8 @@ TORQUE = {"owner": 0.15, "refitted": 0.142, "final": 0.131, "plain": 0.14}
 
 def test_a_residual_above_its_noise_falls_to_it() -> None:
     assert improvement(result(9e-3, 1e-3, 1e-3)).endswith("falls from 9.00 mrad rms to its noise.")
+    assert improvement(result(9e-3, 9.001e-3, 1e-3)).endswith("stays at 9.00 mrad rms.")
+    assert improvement(result(9e-3, 9.1e-3, 1e-3)).endswith("does not fall: 9.10 mrad instead of 9.00 mrad rms.")
 
 
 def test_of_a_residual_below_its_noise_the_torque_is_told() -> None:

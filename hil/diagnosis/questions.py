@@ -11,6 +11,7 @@ from hil.diagnosis.result import CLOCK, MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.least_squares import Columns
 from hil.identification.periods import refined_period, strongest_periods
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import BINS, ResidualSeries
@@ -123,14 +124,23 @@ def change_over_time(
 
 
 def clocks_of_encoders(data: Dataset, parts: Sequence[ResidualSeries]) -> SteadyChange | None:
-    """How the lateness of the second encoder changes steadily, beside its ratio and datum; None where nothing tells."""
-    ratio = data.bench.axis.ratio_m_rad
-    motions = [measured_motion(run).moved for run in data.runs]
-    columns = [
-        {ENCODER_LATENESS: -ratio * one.velocity, "ratio": ratio * one.position, "datum": np.ones(one.position.size)}
-        for one in motions
-    ]
-    return steady_change(parts, columns, [run.time_s for run in data.runs], ENCODER_LATENESS)
+    """How the lateness of the second encoder changes steadily; None where another change tells more, or rows are few.
+
+    Others are a reversal error or a twist by acceleration that changes steadily, and any of these at a moment.
+    """
+    ratio, columns = data.bench.axis.ratio_m_rad, list[Columns]()
+    for run in data.runs:
+        moved = measured_motion(run).moved
+        place = {"ratio": ratio * moved.position, "datum": np.ones(moved.position.size)}
+        bends = {"reversal": moved.direction, "twist": moved.acceleration}
+        columns.append({ENCODER_LATENESS: -ratio * moved.velocity, **place, **bends})
+    times_s = [run.time_s for run in data.runs]
+    names = (ENCODER_LATENESS, "reversal", "twist")
+    steady = [found for name in names if (found := steady_change(parts, columns, times_s, name))]
+    moment = moment_of_change(parts, columns, times_s)
+    told: list[MomentOfChange | SteadyChange] = [*steady, *([moment] if moment else [])]
+    best = min(told, key=lambda one: one.course.p, default=None)
+    return best if isinstance(best, SteadyChange) and best.coefficient == ENCODER_LATENESS else None
 
 
 def about(change: MomentOfChange | SteadyChange) -> Question:

@@ -253,7 +253,8 @@ def _dependences(
         return
     torque = channel == TORQUE
     if change := change_over_time(whole, of_whole, plain) if torque else clocks_of_encoders(whole, of_whole):
-        found, enough = change.course, least if torque else CRITERIA.material * least  # counts make no such course
+        # counts beat over the place, not over time at a speed
+        found, enough = change.course, least if torque else CRITERIA.material * least
         yield Dependence(channel, about(change), found, min(found.energy / all_of_it, 1.0), found.energy / enough, None)
 
 

@@ -131,7 +131,8 @@ def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None
     told = early.value or (early.std_error > 0.0 and sure(delay_s / period_s, early.std_error / period_s))
     if not told or abs(delay_s) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
         return None
-    how = f"{delay_in_words(delay_s)}; of it half a row, as each value is held for one"
+    half = "of it half a row" if early.value else "half a row"
+    how = f"{delay_in_words(delay_s)}; {half}, as each value is held for one"
     return BenchValue("torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", how)
 
 

@@ -19,7 +19,7 @@ from hil.importing.questions import effort_unit, position_unit, speed_unit
 from hil.importing.relations import SAME_POSITION, derivative_of, driven, lateness_s, proportional
 from hil.importing.roles import Roles, may_be_asked
 from hil.importing.speed_unit import speed_entry
-from hil.importing.unit_choice import MATCH, is_length, misfit
+from hil.importing.unit_choice import MATCH, is_length, misfit, travel_per_unit
 from hil.importing.usual_values import LEADS_M, mixed_up, usual_lead
 from hil.quantities import ROTARY_LEAD_M, UNITS
 
@@ -213,7 +213,7 @@ class ChannelEntries:
             keys |= count
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive
             per_count = self.per_count / (1.0 if same else abs(factor))
-            lever = (self.draft.lead_m or 0.0) / (2.0 * pi) * UNITS[motor][1] if UNITS[motor][0] == "rad" else 1.0
+            lever = travel_per_unit(motor, self.draft.lead_m or 0.0)
             per_m = scale_count(1.0 / (per_count * lever)) if lever and channel == "table_position_m" else None
             if per_m is not None and not same:
                 keys |= {"counts_per_m": per_m}

@@ -56,7 +56,7 @@ def find_clock(table: ForeignTable, labels: dict[str, Label], rate_hz: float | N
         return _of_rate(table, labels, rate_hz, "given with --rate")
     told = _written_rate(table)
     named = time_columns(table, labels)
-    grow = [name for name in named or _unnamed(table, labels) if growing(table.columns[name])]
+    grow = [name for name in named or _unnamed(table, labels, told is None) if growing(table.columns[name])]
     if found := clock_of(table, labels, grow, told):
         return found
     even = [rate for name in named if (rate := _of_intervals(table, labels, name))]
@@ -136,22 +136,22 @@ def _stamps(table: ForeignTable, labels: dict[str, Label], name: str) -> Stamps:
     return Stamps.of(time, stamps, unit is not None)
 
 
-def _unnamed(table: ForeignTable, labels: dict[str, Label]) -> list[str]:
+def _unnamed(table: ForeignTable, labels: dict[str, Label], timed: bool) -> list[str]:
     """The first column without a known quantity that grows by nearly equal steps, or holds seconds since 1970.
 
-    A unit of time counts whatever else the name says, as in cycle_us. Row numbers are none.
+    `timed`: also one whose name has a unit of time and tells another quantity, such as cycle_us. Row numbers are none.
     """
     for name, values in table.columns.items():
-        steps = np.diff(counted_on(values, range_of(values)))
+        steps, in_time = np.diff(counted_on(values, range_of(values))), labels[name].unit in SECONDS
         if labels[name].quantity is Quantity.UNKNOWN and (whole_seconds(values) or since_1970(values)):
             return [name]
         if (
-            (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter or labels[name].unit in SECONDS)
+            (labels[name].quantity is Quantity.UNKNOWN or labels[name].letter or (timed and in_time))
             and steps.size
             and np.isfinite(steps).all()
             and steps.min() > 0
         ):
-            row_numbers = counts_rows(values) and values[0] in (0.0, 1.0)
+            row_numbers = counts_rows(values) and values[0] in (0.0, 1.0) and not in_time
             if np.ptp(steps) < 0.2 * np.median(steps) and not row_numbers:
                 return [name]
     return []

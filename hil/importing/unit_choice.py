@@ -9,7 +9,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.importing.column_names import Label
 from hil.importing.lexicon import lexicon
-from hil.quantities import UNITS
+from hil.quantities import ROTARY_LEAD_M, UNITS
 
 MATCH = 0.02  # relative deviation of a factor between two columns from that of two units: above following errors
 LENGTHS = ("m", "mm", "um", "in")
@@ -116,3 +116,11 @@ def _by_whole_turns(travel: float) -> str:
 def misfit(factor: float, unit: str, other: str) -> float:
     """Ratio by which values in `unit` = factor x values in `other` contradict the two units; 1 if they agree."""
     return abs(factor) * UNITS[unit][1] / UNITS[other][1]
+
+
+def travel_per_unit(unit: str, lead_m: float) -> float:
+    """Length [m] per unit of a motor's position: of an angle by the lead of its screw; 1 without one."""
+    si, factor = UNITS[unit]
+    if si != "rad":
+        return factor
+    return lead_m / (2.0 * pi) * factor if lead_m != ROTARY_LEAD_M else 1.0

@@ -21,10 +21,13 @@ from hil.recording.recording import read_recording
 ROWS, NOISE_RAD, RATE = 20_000, 0.02, 4e-5
 
 
-def clocks(folder: Path, rate: float) -> list[Dependence]:
-    """What is told of the clocks of an axis whose second encoder runs fast by a rate."""
+def drift(columns: dict[str, np.ndarray], rate: float) -> np.ndarray:
+    return np.interp(columns["t"] * (1.0 - rate), columns["t"], columns["angle"])
+
+
+def clocks(folder: Path, read: np.ndarray) -> list[Dependence]:
+    """What is told of the clocks of an axis by what its second encoder has read (n,)."""
     columns = axis(ROWS)
-    read = np.interp(columns["t"] * (1.0 - rate), columns["t"], columns["angle"])
     columns["load"] = read + np.random.default_rng(5).normal(0.0, NOISE_RAD, ROWS)
     named = renamed(columns, t="time_s", angle="motor_angle_rad", load="load_angle_rad", torque="torque_Nm")
     import_(write(folder / "log.csv", named), None, folder / "log.parquet", None, None)
@@ -34,15 +37,25 @@ def clocks(folder: Path, rate: float) -> list[Dependence]:
     return [one for one in left if one.question.name == CLOCK]
 
 
-def test_clocks_of_encoders_that_run_apart_are_told(tmp_path: Path) -> None:
-    (one,) = clocks(tmp_path, RATE)
+@pytest.mark.parametrize(("rate", "way"), [(RATE, "later"), (-RATE, "earlier")])
+def test_clocks_of_encoders_that_run_apart_are_told(tmp_path: Path, rate: float, way: str) -> None:
+    (one,) = clocks(tmp_path, drift(axis(ROWS), rate))
     assert one.question.change is not None
     assert one.question.change.coefficient == ENCODER_LATENESS
-    assert one.question.change.rate == pytest.approx(RATE, rel=0.2)
+    assert one.question.change.rate == pytest.approx(rate, rel=0.2)
     assert one.in_words("N m").startswith("the clocks of both encoders run apart by")
     assert "the second encoder is recorded" in one.in_words("N m")
-    assert "later than at the begin" in one.in_words("N m")
+    assert f"{way} than at the begin" in one.in_words("N m")
 
 
-def test_one_clock_is_not_two(tmp_path: Path) -> None:
-    assert clocks(tmp_path, 0.0) == []
+@pytest.mark.parametrize("other", ["one clock", "a step of lateness", "a reversal error that grows", "a growing twist"])
+def test_another_change_is_no_clock(tmp_path: Path, other: str) -> None:
+    columns = axis(ROWS)
+    share, angle = columns["t"] / columns["t"][-1], columns["angle"]
+    read = {
+        "one clock": angle,
+        "a step of lateness": np.interp(columns["t"] - 5e-4 * (share > 0.5), columns["t"], angle),
+        "a reversal error that grows": angle - 0.15 * share * np.sign(columns["speed"]),
+        "a growing twist": angle - 2e-3 * (1.0 + 5.0 * share) * columns["torque"],
+    }
+    assert clocks(tmp_path, read[other]) == []

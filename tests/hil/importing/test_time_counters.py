@@ -54,7 +54,7 @@ def test_a_counter_of_common_width_is_counted_on(tmp_path: Path, counter: str) -
 
 
 def test_a_column_in_a_unit_of_time_that_grows_evenly_is_the_clock(tmp_path: Path) -> None:
-    """Whatever else its name says."""
+    """Its name may tell another quantity."""
     path = tmp_path / "log.csv"
     path.write_text(text(4_120_000.0 + 1e6 * T, "cycle_us,angle_rad,torque_Nm"))
     clock = draft_map(path).clock

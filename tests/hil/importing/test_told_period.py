@@ -44,6 +44,22 @@ PERIODS = {
 }
 
 
+@pytest.mark.parametrize(
+    "line", ["Ritardo campionamento: 10 ms", "Retardo de muestreo 5 ms", "Filtre echantillonnage 2 ms"]
+)
+def test_a_delay_or_a_filter_of_the_sampling_is_no_period(tmp_path: Path, line: str) -> None:
+    with pytest.raises(RateNeeded):
+        drafted(tmp_path / "log.txt", f"{line}\n")
+
+
+def test_a_period_of_the_header_goes_before_a_counter_in_a_unit_of_time(tmp_path: Path) -> None:
+    columns = {"cycle_ms": 5.0 + 0.3 * ROWS, **COLUMNS}
+    assert drafted(tmp_path / "log.txt", "sampling period 4 ms\n", columns).clock.rate_hz == pytest.approx(250.0)
+    told = drafted(tmp_path / "from_zero.txt", "", {"cycle_ms": 1.0 * ROWS, **COLUMNS}).clock
+    assert told.time is not None
+    assert (told.time.column, told.time.unit) == ("cycle_ms", "ms")
+
+
 @pytest.mark.parametrize("line", PERIODS)
 def test_a_line_with_the_period_is_the_clock(tmp_path: Path, line: str) -> None:
     draft = drafted(tmp_path / "log.txt", line)

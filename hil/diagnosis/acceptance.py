@@ -75,7 +75,7 @@ def _laps(of: Addition, c: Criteria) -> Answer | None:
 def _shape(of: Addition | Need, c: Criteria) -> Answer | None:
     if of.log_chance is None:
         return None
-    return of.log_chance < -0.5 * c.evidence, {"chance": math.exp(of.log_chance)}
+    return of.log_chance < math.log(c.significance), {"chance": math.exp(of.log_chance)}
 
 
 def _constant(of: Addition, c: Criteria) -> Answer | None:

@@ -33,11 +33,12 @@ from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.plain_model import PlainModel
-from hil.identification.structure import ResidualSeries, Structure, offset, slow, structure
+from hil.identification.structure import ResidualSeries, Structure, offset, structure
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
+_SECONDS = dict.fromkeys(("N m", "N", "V"), "s")
 # Coefficients of the plain model, and their units on axes whose torque is in N m, N, or V.
 _COEFFICIENTS = {
     "inertia": ("the inertia", {"N m": "kg m^2", "N": "kg", "V": "V s^2/rad"}),
@@ -46,8 +47,8 @@ _COEFFICIENTS = {
     "offset": ("the load", {}),
     "sine": ("the torque over the sine of the angle", {}),
     "cosine": ("the torque over the cosine of the angle", {}),
-    LATENESS: ("the delay of the recorded torque", dict.fromkeys(("N m", "N", "V"), "s")),
-    ENCODER_LATENESS: ("the delay of the second encoder", dict.fromkeys(("N m", "N", "V"), "s")),
+    LATENESS: ("the delay of the recorded torque", _SECONDS),
+    ENCODER_LATENESS: ("the delay of the second encoder", _SECONDS),
 }
 _RESIDUAL = {TORQUE: "motor", DIFFERENCE: "table"}  # channel of the twin that shows it
 
@@ -247,13 +248,12 @@ def _dependences(
     all_of_it = float(np.var(np.concatenate([part.left[part.rows] for part in of_whole])))
     question = over_time(fit.hypothesis, whole)
     if found := structure(of_whole, question.values, question.bins):
-        found = replace(found, p=max(found.p, slow(of_whole, question.values, found)))
         yield Dependence(channel, question, found, found.energy / all_of_it, found.energy / least, None)
     if not one_way:
         return
     torque = channel == TORQUE
     if change := change_over_time(whole, of_whole, plain) if torque else clocks_of_encoders(whole, of_whole):
-        # counts beat over the place, not over time at a speed
+        # errors of counts repeat with the position and do not grow with time
         found, enough = change.course, least if torque else CRITERIA.material * least
         yield Dependence(channel, about(change), found, min(found.energy / all_of_it, 1.0), found.energy / enough, None)
 

@@ -109,13 +109,21 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
     return draft
 
 
+def _held_late(recording: Recording, plant: PlantValues) -> Estimate | None:
+    """Delay [s] of a torque that is held from row to row, negative if it has acted before; None where not told."""
+    if plant.early_s is None or rows_are_ticks(recording):
+        return None
+    return replace(plant.early_s, value=plant.early_s.value - 0.5 * recording.period_s)
+
+
 def _is_sampled(recording: Recording, plant: PlantValues) -> bool:
     """True if the torque of a row has acted before one that is held until the next row would."""
-    early = plant.early_s
-    if early is None or not early.std_error > 0.0 or rows_are_ticks(recording):
-        return False
-    late_rows = 0.5 - early.value / recording.period_s
-    return late_rows > 0.0 and sure(late_rows, early.std_error / recording.period_s)
+    delay = _held_late(recording, plant)
+    return delay is not None and delay.value < 0.0 and _told(delay, recording.period_s)
+
+
+def _told(delay: Estimate, period_s: float) -> bool:
+    return delay.std_error > 0.0 and sure(delay.value / period_s, delay.std_error / period_s)
 
 
 def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None:
@@ -123,17 +131,14 @@ def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None
 
     Samples of one instant act half a row before they are held.
     """
-    early = plant.early_s
-    if early is None or rows_are_ticks(recording):
+    delay = _held_late(recording, plant)
+    if delay is None or plant.early_s is None or abs(delay.value) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
         return None
-    period_s = recording.period_s
-    delay_s = early.value - 0.5 * period_s
-    told = early.value or (early.std_error > 0.0 and sure(delay_s / period_s, early.std_error / period_s))
-    if not told or abs(delay_s) > MOST_TORQUE_DELAY_S:  # of slow rows: found from 0
+    if not (plant.early_s.value or _told(delay, recording.period_s)):
         return None
-    half = "of it half a row" if early.value else "half a row"
-    how = f"{delay_in_words(delay_s)}; {half}, as each value is held for one"
-    return BenchValue("torque_delay_s", delay_s, f"s, +-{early.std_error:.2g}", how)
+    half = "of it half a row" if plant.early_s.value else "half a row"
+    how = f"{delay_in_words(delay.value)}; {half}, as each value is held for one"
+    return BenchValue("torque_delay_s", delay.value, f"s, +-{delay.std_error:.2g}", how)
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:

@@ -27,8 +27,8 @@ class PlantValues:
 
     `gravity` is the torque G over the load's angle [N m], `gravity_angle` its q0 [rad], both at the load. `spring` is
     the torque over the motor's position k [N m/rad, N/m]. `one_way` is Coulomb friction and load together, in the
-    direction of a motion that does not tell them apart; then half of it stands for each. `early_s` [s]: the torque is
-    recorded so much before the motion that it makes; 0 where that is within its error.
+    direction of a motion that does not tell them apart; then it is friction, which a bench cannot lack. `early_s` [s]:
+    the torque is recorded so much before the motion that it makes; 0 where that is within its error.
     """
 
     inertia: Estimate
@@ -104,11 +104,12 @@ def plant_values(recordings: Sequence[Recording], load_ratio: float | None = Non
         way, mean = float(np.sign(moving[0])), float(np.mean(np.abs(moving)))
         slope = viscous.std_error * mean < abs(coulomb.value + way * offset.value)  # else one speed: all of it together
         one_way = _together(fit, {"coulomb": 1.0, "offset": way, "viscous": 0.0 if slope else mean})
-        half, size = max(0.5 * one_way.value, 0.0), abs(one_way.value)
+        friction, size = max(one_way.value, 0.0), abs(one_way.value)
         how = (
-            f"half of friction and load, {one_way.value:.3g} +-{one_way.std_error:.2g}: motion one way tells their sum"
+            f"friction and load, {one_way.value:.3g} +-{one_way.std_error:.2g}: motion one way tells their sum, which "
+            "is taken for friction"
         )
-        coulomb, offset = Estimate(half, size, how), Estimate(way * (one_way.value - half), size, how)
+        coulomb, offset = Estimate(friction, size, how), Estimate(way * (one_way.value - friction), size, how)
         if not slope:
             viscous = Estimate(0.0, size / mean, "not told from Coulomb friction at one speed")
     elif viscous.value < 0.0:

@@ -44,7 +44,7 @@ _SLIDING = 0.02  # of the top speed: below, an axis may stick, and its motion do
 _OTHER_WAY = 2.0  # independent samples that tell the friction of slow motion the other way
 _FEWEST = len(MOTION) + 2  # independent samples: two more than coefficients
 _NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes the inertia too small by this share
-_LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
+LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
 _LAW = ("slow", "fast")  # coefficients of a friction that bends at low and at high speed
 _BEND = 0.1  # of the top speed: range of speed in which a friction that falls from rest is felt
 _FARTHEST_ROWS, _FARTHEST_S = 8, 0.04  # lateness of a torque that is sought; the larger of both
@@ -116,7 +116,7 @@ def _window(position: FloatArray, noise: float, period_s: float) -> int:
     """Rows of the shortest window that passes little noise: longer ones leave less motion between reversals."""
     window = best = max(round(SMOOTH_S / period_s) | 1, 3)
     least = np.inf
-    while least == np.inf or (window <= position.size // 4 and window * period_s <= _LONGEST_S):
+    while least == np.inf or (window <= position.size // 4 and window * period_s <= LONGEST_S):
         inner = slice(window, -window) if position.size > 3 * window else slice(None)
         acceleration = matched_motion(position, period_s, window).acceleration[inner]
         share = (noise * noise_gains(period_s, window)[2]) ** 2 / max(float(np.var(acceleration)), 1e-300)

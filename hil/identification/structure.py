@@ -2,9 +2,9 @@
 
     m = A r,    W = m' (A R A')^-1 m,    F = W / (K - 1) * (v - K) / v     against F(K - 1, v - K)
 
-A (K, n) averages the rows of each of K bins of the quantity, R is the autocovariance of what the bin means leave (A. R.
-Gallant, Nonlinear Statistical Models, 1987, sec. 2.1: correction of least squares for autocorrelated errors), tapered
-after Bartlett, and v the number of independent rows. Slow noise moves a whole bin, and is no structure.
+A (K, n) averages the rows of each of K bins of the quantity, less the mean of all. R is the covariance of what the bin
+means leave, by its spectrum (`hil.identification.spectrum`), and v its degrees of freedom (F. E. Satterthwaite,
+Biometrics Bulletin 2 (1946) 110). Slow noise moves a whole bin, and is no structure.
 """
 
 from collections.abc import Sequence
@@ -13,16 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 from scipy.stats import f as fisher
 
 from hil.arrays import FloatArray
+from hil.identification.spectrum import spectrum
 
 BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as many for one that is asked by direction
 _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
 _DECAYED = 0.05  # of the variance: the correlation time ends there
 _NARROWEST = 0.2  # bin, over one of equal width
-_BATCHES = 4  # of a bin: the fewer, the slower a noise that they know
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 
@@ -83,19 +82,19 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
     where = [_bin(one, edges) for one in quantity]
     rows = _sums(parts, where, [part.rows.astype(np.float64) for part in parts], count)
     mean = _sums(parts, where, [part.left for part in parts], count) / np.maximum(rows, 1.0)
+    noise = [np.where(part.rows, part.left - mean[at], 0.0) for part, at in zip(parts, where, strict=True)]
     share = rows / rows.sum()
     mean -= share @ mean
-    noise = [part._replace(left=part.left - mean[at]) for part, at in zip(parts, where, strict=True)]
-    correlation = autocovariance(noise)
-    independent = rows.sum() * correlation[0] / max(correlation[0] + 2.0 * correlation[1:].sum(), 1e-300)
-    if not correlation[0] > 0.0 or independent < _FEWEST_INDEPENDENT * count:
+    inside = [[part.rows & (at == number) for part, at in zip(parts, where, strict=True)] for number in range(count)]
+    fitted = [[one / max(row, 1.0) ** 0.5 for one in each] for each, row in zip(inside, rows, strict=True)]
+    # the mean of all rows is no structure
+    apart = [
+        [one / max(row, 1.0) - part.rows / rows.sum() for one, part in zip(each, parts, strict=True)]
+        for each, row in zip(inside, rows, strict=True)
+    ]
+    covariance, independent = spectrum(noise, fitted, int(rows.sum())).covariance(apart)
+    if not np.trace(covariance) > 0.0 or independent < _FEWEST_INDEPENDENT * count:
         return None
-    covariance = np.zeros((count, count))
-    for part, at in zip(parts, where, strict=True):
-        covariance += _of_sums(part, at, correlation, count)
-    covariance /= np.outer(np.maximum(rows, 1.0), np.maximum(rows, 1.0))
-    centre = np.eye(count) - share  # the mean of all rows is no structure
-    covariance = centre @ covariance @ centre.T
     axes, size, _ = np.linalg.svd(covariance)
     freed = independent - count
     contrast = (axes.T @ mean)[:-1] ** 2 / size[:-1]
@@ -105,41 +104,18 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
     return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
 
 
-def slow(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], found: Structure) -> float:
-    """Probability that noise which is slow, however weak, makes a structure over a quantity that goes with time.
-
-    Analysis of variance of the bin means against the means of the batches of each bin (B. Schmeiser, Operations
-    Research 30 (1982) 556): an autocovariance that has decayed to a small share may go on for long.
-    """
-    left, value = (
-        np.concatenate([one[part.rows] for one, part in zip(each, parts, strict=True)])
-        for each in ([part.left for part in parts], quantity)
-    )
-    at = _bin(value, found.edges)
-    batches = [np.array_split(left[at == number], _BATCHES) for number in range(found.means.size)]
-    batches = [one for one in batches if one[-1].size]
-    free = len(batches) - 1, len(batches) * (_BATCHES - 1)
-    if free[0] < 1:
-        return 1.0
-    between = sum(one.size * (float(one.mean()) - float(left.mean())) ** 2 for one in map(np.concatenate, batches))
-    within = sum(
-        one.size * (float(one.mean()) - float(np.mean(np.concatenate(each)))) ** 2 for each in batches for one in each
-    )
-    return float(fisher.sf(between / free[0] / (within / free[1]), *free)) if within > 0.0 else 0.0
-
-
 def offset(parts: Sequence[ResidualSeries]) -> Structure | None:
     """Mean of residuals over all rows, as a structure of one bin; None where there are too few independent rows."""
     left = np.concatenate([part.left[part.rows] for part in parts])
     if not left.size:
         return None
-    mean = float(left.mean())
-    correlation = autocovariance([part._replace(left=part.left - mean) for part in parts])
-    spread = max(correlation[0] + 2.0 * float(correlation[1:].sum()), correlation[0])
-    independent = left.size * correlation[0] / spread if spread > 0.0 else 0.0
-    if independent < _FEWEST_INDEPENDENT:
+    mean, rows = float(left.mean()), left.size
+    noise = [np.where(part.rows, part.left - mean, 0.0) for part in parts]
+    whole = [[part.rows / rows for part in parts]]
+    covariance, independent = spectrum(noise, [[one * rows**0.5 for one in whole[0]]], rows).covariance(whole)
+    if not covariance[0, 0] > 0.0 or independent < _FEWEST_INDEPENDENT:
         return None
-    variance = spread / left.size
+    variance = float(covariance[0, 0])
     p = float(fisher.sf(mean**2 / variance, 1, independent))
     edges = np.array([-np.inf, np.inf])
     return Structure(edges, np.array([mean]), np.array([variance**0.5]), mean**2 - variance, p)
@@ -183,13 +159,3 @@ def _sums(
     for part, at, one in zip(parts, where, values, strict=True):
         found += np.bincount(at[part.rows], weights=one[part.rows], minlength=count)
     return found
-
-
-def _of_sums(part: ResidualSeries, at: NDArray[np.intp], correlation: FloatArray, count: int) -> FloatArray:
-    """Covariance (K, K) of the sums of the bins of one part."""
-    inside = np.zeros((count, at.size))
-    inside[at[part.rows], np.flatnonzero(part.rows)] = 1.0
-    both = np.concatenate([correlation[:0:-1], correlation])[None, :]
-    first = correlation.size - 1
-    spread = fftconvolve(inside, both, mode="full", axes=1)[:, first : first + at.size]
-    return np.asarray(spread @ inside.T)

@@ -1,5 +1,7 @@
 """Read datasets of an HDF5 file with h5py, an optional library."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ from hil.files.input_file import check_values, parsing
 from hil.files.optional_library import optional_library
 from hil.importing.channel_groups import Group, as_seconds, one_length
 from hil.importing.column_names import label
-from hil.importing.lexicon import Quantity
+from hil.importing.lexicon import Quantity, RowKind, lexicon
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _FACTORS, _OFFSETS = ("scale_factor",), ("add_offset",)  # of the conventions CF for netCDF
@@ -19,8 +21,8 @@ _MISSING = ("_FillValue", "missing_value")
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """Datasets and fields of tables by name, texts, and attributes of their groups and of the root.
 
-    Units, factors and missing values are those of the attributes of a dataset. An attribute with different values in
-    several groups is left out. Links to other files are not followed.
+    Units, factors and missing values are those of the attributes of a dataset, of which other numbers are read too. An
+    attribute with different values in several places is left out. Links to other files are not followed.
     Raises InputError: damaged, too many values, or h5py is not installed.
     """
     library = optional_library(path, "h5py", "h5py", "exchange")
@@ -40,6 +42,10 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
         for one in [file, *(file[name] for name in groups if isinstance(file[name], library.Group))]:
             for name, value in one.attrs.items():
                 if isinstance(value, scalars):
+                    told.setdefault(name, set()).add(value)
+        for one in datasets:
+            for name, value in one.attrs.items():
+                if isinstance(value, scalars[1:]) and not (name in _MISSING or _factor(name) or _offset(name)):
                     told.setdefault(name, set()).add(value)
         texts = {name: np.array(*values) for name, values in told.items() if len(values) == 1}
     arrays, units = one_length(path, read)
@@ -93,15 +99,26 @@ def _scaled(attributes: Any, values: Any) -> Any:
         return as_seconds(values)
     if values.dtype.kind not in "fiub":
         return values
-    factor, offset = _number(attributes, _FACTORS, 1.0), _number(attributes, _OFFSETS, 0.0)
-    missing = [_number(attributes, (key,), np.nan) for key in _MISSING]
+    counts = values.dtype.kind in "iu"  # others may hold the factor already
+    factors = [*_FACTORS, *(name for name in attributes if counts and _factor(name))]
+    offsets = [*_OFFSETS, *(name for name in attributes if counts and _offset(name))]
+    factor, offset = _number(attributes, factors, 1.0), _number(attributes, offsets, 0.0)
+    missing = [_number(attributes, [key], np.nan) for key in _MISSING]
     bad = np.isin(values, [one for one in missing if np.isfinite(one)])
     if bad.any():
         values = np.where(bad, np.nan, values.astype(np.float64))
     return values if (factor, offset) == (1.0, 0.0) else factor * values.astype(np.float64) + offset
 
 
-def _number(attributes: Any, names: tuple[str, ...], default: float) -> float:
+def _factor(name: str) -> bool:
+    return name in _FACTORS or re.fullmatch(lexicon().rows[RowKind.SCALE], name, re.IGNORECASE) is not None
+
+
+def _offset(name: str) -> bool:
+    return name in _OFFSETS or re.fullmatch(lexicon().rows[RowKind.OFFSET], name, re.IGNORECASE) is not None
+
+
+def _number(attributes: Any, names: Sequence[str], default: float) -> float:
     for name in names:
         value = np.asarray(attributes[name]) if name in attributes else np.empty(0)
         if value.size == 1 and value.dtype.kind in "fiub":

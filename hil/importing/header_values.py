@@ -36,7 +36,8 @@ class _Statement:
 
 
 _NUMBER = re.compile(r"(?<![\w.])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
-_HEX = re.compile(r"\b0x[0-9a-f]+(:[0-9a-f]+)?|(?<=\w)\[\d+\]")  # addresses, and the index of a parameter
+# addresses, the index of a parameter, and what a rated value stands for
+_NO_VALUE = re.compile(r"\b0x[0-9a-f]+(:[0-9a-f]+)?|(?<=\w)\[\d+\]|[(\[]\s*100\s*%\s*[)\]]")
 _BRACKET = re.compile(r"[\[({]([^\[({]*?)[\])}][\s:=;,|\"']*$")
 _SEPARATED = re.compile(r"[\s:=;,|\"']*")
 _PHRASES = re.compile(r"[;,|\t:=\"]+")
@@ -75,7 +76,7 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
 
 def _statements(line: str) -> Iterator[_Statement]:
     """Statements of a line; numbers that follow the first one without words are those of other channels."""
-    folded = _HEX.sub(" ", _folded(line.strip().strip('"#%/ ')))
+    folded = _NO_VALUE.sub(" ", _folded(line.strip().strip('"#%/ ')))
     if turn := _TURN_IS.match(folded):
         size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
         yield from [_Statement("", size, (unit,), line.strip())] if size is not None else []

@@ -15,7 +15,6 @@ from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
 
 KNOTS = 6
-_PLACE = Dimension.LENGTH
 
 
 @njit
@@ -74,7 +73,12 @@ def _reading_within_period(value: float, at: Moment, parameters: Row, memory: Ro
 
 
 def _map(
-    name: str, stage: Stage, law: Callable[..., float], text: str, over: str = "position_m", along: Dimension = _PLACE
+    name: str,
+    stage: Stage,
+    law: Callable[..., float],
+    text: str,
+    over: str = "position_m",
+    along: Dimension = Dimension.LENGTH,
 ) -> Mechanism:
     of_torque = stage is Stage.MOTOR_TORQUE
     of, what = ("n_m", Dimension.TORQUE) if of_torque else ("m", Dimension.LENGTH)

@@ -28,7 +28,7 @@ from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.stages import Prepared, Progress, Searched
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.inference import bic_gain, standard_errors, whitening
+from hil.identification.inference import bic_gain, bic_margin, standard_errors, whitening
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
@@ -110,7 +110,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     given, nominal = base.estimator.evaluate(base.hypothesis.given), base
     begun = given, nominal
     rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()
-    tried, fitted = [effects(())], set[str]()
+    tried, fitted, exchanged_from = [effects(())], set[str](), list[tuple[Fit, dict[Key, float]]]()
     while len(base.terms) < MOST_TERMS:
         begins = not base.terms or bool(base.data.set_aside)  # what was found above the noise, rows at rest may tell
         if begins and base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
@@ -132,6 +132,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
             rivals, considered = other.rivals, [*considered, *other.considered]
             if effects(other.fit.terms) not in tried:
                 step("searching on with another mechanism in the place of one")
+                exchanged_from.append((base, needed))
                 base, needed, pruned = _pruned(other.fit, beside_loads(nominal, other.fit))
                 base, considered = claimed(base), [*considered, *pruned]
                 tried.append(effects(other.fit.terms))
@@ -152,6 +153,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         tried.append(effects(base.terms))
         if len(base.terms) >= CRITERIA.in_vain and mismatch_left(nominal, base, base.data) > CRITERIA.most_left:
             break
+    base, needed = _best((base, needed), exchanged_from)
     step("fitting the explanation to convergence")
     final = ended(again(revised(base).refit(ENDED), ENDED))
     kept = {term.key for term in final.terms}
@@ -160,6 +162,17 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     rivals = {key: value for key, value in rivals.items() if key in kept}
     given, nominal, final = (fit.without_deadline() for fit in (*begun, final))
     return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)
+
+
+def _best(
+    last: tuple[Fit, dict[Key, float]], others: Sequence[tuple[Fit, dict[Key, float]]]
+) -> tuple[Fit, dict[Key, float]]:
+    """The last explanation, or one of the `others`, which an exchange of terms left, if that is refuted beside it."""
+    best = last
+    for one in others:
+        if one[0].data is best[0].data and bic_margin(one[0], best[0]) >= CRITERIA.tied:
+            best = one
+    return best
 
 
 def unexplained_channels(fit: Fit) -> dict[str, float]:

@@ -3,11 +3,12 @@
     r = c s + inertia, friction, offset, and what other parameters of the fit change,
     s = r of the fit without the term - r of the fit with it,
 
-s of the smoothed motion and of the torque that the plain model needs for it: what a term makes of the noise of position
-and torque, which is in r too, is no evidence.
+s of the intended motion (`hil.identification.intended_motion`), in the difference of the encoders of the smoothed one,
+and of the torque that the plain model needs for it: what a term makes of the noise of position and torque, which is in
+r too, is no evidence.
 
-Least squares on the rows that slide: `c / error` is Student's t, with an error that counts the autocovariance, and as
-many degrees of freedom as independent rows. Thousands of rows together tell what hides in the noise of each one.
+Least squares on the rows that slide: `c / error` is Student's t, with an error and degrees of freedom by the spectrum
+of what is left (`hil.identification.spectrum`). Thousands of rows together tell what hides in the noise of each one.
 """
 
 import math
@@ -29,11 +30,13 @@ from hil.diagnosis.structure_left import TORQUE, channels, least_energy, left_in
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import intended
 from hil.identification.laps import Laps
-from hil.identification.noise_apart import smoothed_runs
+from hil.identification.noise_apart import intended_runs, smoothed_runs
 from hil.identification.parallel import in_parallel
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
-from hil.identification.structure import ResidualSeries, autocovariance
+from hil.identification.spectrum import spectrum
+from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain, measured_motion
 from hil.identification.whitening import RANK, filtered, spread, whitening_filter
@@ -70,7 +73,7 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
     # then one is the shape, and no nuisance
     offset = any(Active(term.effect, term.values, term.variant).is_offset for term in added)
     for channel, own in asked.channels.items():
-        after = left_in_channel(shaped, asked.quiet, channel, asked.plain, fast)
+        after = left_in_channel(shaped, own.calm, channel, asked.plain, fast)
         rows = [at & one.clear for at, one in zip(own.rows, after, strict=True)]
         counted = np.concatenate([one.clear[at] for at, one in zip(own.rows, after, strict=True)])
         shape = own.quiet[counted] - _joined(after, rows)
@@ -87,7 +90,7 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
                 chance = _log_tail(abs(ratio) * removes**0.5, free)
             else:
                 chance = math.log(2.0) + _log_tail(abs(ratio), free)
-            best = min(best, math.log(len(LIBRARY)) + searched * math.log(free) + chance)
+            best = min(best, math.log(len(LIBRARY)) + searched * math.log(counted.sum()) + chance)
     return best
 
 
@@ -125,7 +128,7 @@ def _faint(found: Hypothesis, added: Sequence[Term], without: Fit) -> tuple[Hypo
 
 
 class _Seen(NamedTuple):
-    """Residuals (m,) of a channel on the rows that slide: of the recordings, and of their smoothed motion (`quiet`).
+    """Residuals (m,) of a channel on the rows that slide: of the recordings, and of their `calm` motion (`quiet`).
 
     Rows in which the twin sticks are left out.
 
@@ -135,6 +138,7 @@ class _Seen(NamedTuple):
 
     rows: list[NDArray[np.bool_]]
     measured: FloatArray
+    calm: Dataset
     quiet: FloatArray
     beside: FloatArray
     constant: NDArray[np.bool_]
@@ -142,11 +146,10 @@ class _Seen(NamedTuple):
 
 
 class _Asked(NamedTuple):
-    """Channels of a fit in which a shape is sought, the plain model, and the recordings with smoothed motion."""
+    """Channels of a fit in which a shape is sought, and the plain model."""
 
     channels: dict[str, _Seen]
     plain: PlainModel
-    quiet: Dataset
 
 
 @lru_cache(maxsize=2)
@@ -159,25 +162,24 @@ def _asked(without: Fit, fast: bool) -> _Asked | None:
     plain = fit_plain(data)
     if plain is None:
         return None
-    quiet = data.over([one.smooth for one in data.apart] or smoothed_runs(data.runs, plain))
     for channel in channels(data):
-        parts = left_in_channel(hypothesis, data, channel, plain, fast)
-        calm = left_in_channel(hypothesis, quiet, channel, plain, fast)
-        rows = [one.rows & one.clear & other.clear for one, other in zip(parts, calm, strict=True)]
-        measured, own = _joined(parts, rows), _joined(calm, rows)
+        calm = data.over((intended_runs if channel == TORQUE else smoothed_runs)(data.runs, plain))
+        parts, quiet = (left_in_channel(hypothesis, one, channel, plain, fast) for one in (data, calm))
+        rows = [one.rows & one.clear & other.clear for one, other in zip(parts, quiet, strict=True)]
+        measured, own = _joined(parts, rows), _joined(quiet, rows)
         if measured.size < _FEWEST_ROWS or not (_holds(measured) and _holds(own)):
             continue
         beside = [np.ones_like(measured)]
         if channel == TORQUE:
-            moved = [plain_columns(measured_motion(run).moved) for run in data.runs]
+            moved = [plain_columns(measured_motion(intended(run)).moved) for run in data.runs]
             beside += [np.concatenate([one[name][at] for one, at in zip(moved, rows, strict=True)]) for name in MOTION]
-        other = (left_in_channel(one, quiet, channel, plain, fast) for one in _other_values(without))
+        other = (left_in_channel(one, calm, channel, plain, fast) for one in _other_values(without))
         changed = (_joined(one, rows) - own for one in other)
         beside += [change for change in changed if _holds(change)]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
         columns = np.column_stack(beside)
-        found[channel] = _Seen(rows, measured, own, columns, np.ptp(columns, axis=0) == 0.0, least)
-    return _Asked(found, plain, quiet)
+        found[channel] = _Seen(rows, measured, calm, own, columns, np.ptp(columns, axis=0) == 0.0, least)
+    return _Asked(found, plain)
 
 
 def _holds(residual: FloatArray) -> bool:
@@ -233,22 +235,15 @@ def _first_coefficient(
     if float(own @ own) < RANK:  # the others make it
         return 0.0, 0.0, 0.0
     splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
-    residual = np.split(signal - scaled @ solved, splits)
-    parts = [ResidualSeries(spread(left, at), at) for left, at in zip(residual, rows, strict=True)]
-    covariance = autocovariance(parts)
-    variance = 0.0
-    for weight, at in zip(np.split(weights[0], splits), rows, strict=True):
-        size = 1 << (2 * at.size - 1).bit_length()
-        products = np.fft.irfft(np.abs(np.fft.rfft(spread(weight, at), size)) ** 2, size)[: covariance.size]
-        lags = covariance[: products.size]
-        variance += float(lags[0] * products[0] + 2.0 * lags[1:] @ products[1 : lags.size])
-    repeated = 1.0 + _repeated(parts, np.split(weights[0], splits), laps) / variance if variance > 0.0 else 1.0
-    variance *= repeated
-    total = repeated * max(float(covariance[0] + 2.0 * covariance[1:].sum()), float(covariance[0]))
-    free = signal.size * float(covariance[0]) / total - matrix.shape[1] if total > 0.0 else 0.0
-    if not (variance > 0.0 and free > 0.0):
+    series = [np.split(one, splits) for one in (signal - scaled @ solved, weights[0], *basis.T)]
+    left, weight, *beside = ([spread(part, at) for part, at in zip(one, rows, strict=True)] for one in series)
+    covariance, free = spectrum(left, beside, signal.size).covariance([weight])
+    variance = float(covariance[0, 0])
+    if not variance > 0.0:
         return 0.0, 0.0, 0.0
-    return float(solved[0] / scale[0]) if scale[0] > 0.0 else 0.0, float(solved[0]) / variance**0.5, free
+    parts = [ResidualSeries(one, at) for one, at in zip(left, rows, strict=True)]
+    repeated = 1.0 + _repeated(parts, series[1], laps) / variance
+    return float(solved[0] / scale[0]), float(solved[0]) / (repeated * variance) ** 0.5, free / repeated
 
 
 def _repeated(parts: Sequence[ResidualSeries], weights: Sequence[FloatArray], laps: Sequence[Laps | None]) -> float:

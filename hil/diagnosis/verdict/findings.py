@@ -16,6 +16,7 @@ from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.rivals import RivalFit
 from hil.diagnosis.sentence import TermErrors, rate_in_words, sentence
 from hil.diagnosis.stages import Searched
+from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.value import Value
 from hil.diagnosis.verdict.confidence import confidence
 from hil.diagnosis.verdict.cross_validation import Ablation
@@ -100,10 +101,14 @@ def findings(
 def confidences(searched: Searched, final: Fit, ablations: Sequence[Ablation], held_out: Dataset) -> tuple[float, ...]:
     """Confidence of each term of a fit, in [0, 1]."""
     fits = [final.on(data) for data in (final.data, held_out) if data.runs]
+    noise = like_noise(final, structure_left(final, held_out))
     missed = missed_beyond_noise(final, held_out)
     margins = [_against(searched, final, term)[2] for term in final.terms]
     return tuple(
-        _sure(final, index) * confidence(_left(fits, ablation.channel), _factor(ablation), margin, missed)
+        _sure(final, index)
+        * confidence(
+            1.0 if ablation.channel in noise else _left(fits, ablation.channel), _factor(ablation), margin, missed
+        )
         for index, (ablation, margin) in enumerate(zip(ablations, margins, strict=True))
     )
 
@@ -149,8 +154,8 @@ def _left(fits: Sequence[Fit], channel: str) -> float:
 
 
 def _factor(ablation: Ablation) -> float:
-    """Energy without a term over that with it: the lower of training and, if they show it, held-out recordings."""
-    if ablation.held_out is None or not ablation.shown:
+    """Energy without a term over that with it: the lower of training and, if it acts there, held-out recordings."""
+    if ablation.held_out is None or not (ablation.acts or ablation.shown):
         return ablation.train
     return min(ablation.train, ablation.held_out)
 

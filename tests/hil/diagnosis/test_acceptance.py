@@ -71,7 +71,7 @@ def test_every_constant_of_evidence_is_used() -> None:
         ({"removed": 0.039}, "material energy"),
         ({"explained": 0.019}, "share of the mismatch"),
         ({"explained": 0.09, "beside": 2}, "share of the mismatch"),
-        ({"log_chance": math.log(1e-4), "evidence": 1e6}, "shape below the noise"),
+        ({"log_chance": math.log(0.011), "evidence": 1e6}, "shape below the noise"),
         ({"unrepeated": (106.0, 100.0)}, "repeated laps"),
         ({"torque": (0.026, 0.02)}, "torque"),
         ({"inside": InsideWindows(0.01, 1.0, 5.0, 1.0, False)}, "constant force"),

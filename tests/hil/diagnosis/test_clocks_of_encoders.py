@@ -26,7 +26,7 @@ def drift(columns: dict[str, np.ndarray], rate: float) -> np.ndarray:
 
 
 def clocks(folder: Path, read: np.ndarray) -> list[Dependence]:
-    """What is told of the clocks of an axis by what its second encoder has read (n,)."""
+    """The clock findings for a reading (n,) of the second encoder."""
     columns = axis(ROWS)
     columns["load"] = read + np.random.default_rng(5).normal(0.0, NOISE_RAD, ROWS)
     named = renamed(columns, t="time_s", angle="motor_angle_rad", load="load_angle_rad", torque="torque_Nm")

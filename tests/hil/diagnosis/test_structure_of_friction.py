@@ -17,16 +17,16 @@ from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
 from hil.recording.recording import read_recording
 
-COLUMNS = axis(24_000)
+COLUMNS, LONG = axis(24_000), axis(48_000)
 WEIGHT_N_M, SHARE = 0.3, 0.1
 ROW = 20  # rows of a slow recording
 DRAG_N_M, PLAY_RAD, RAMP_RAD = 0.15, 12.0, 1.0
 
 
-def left_by(extra: np.ndarray, folder: Path) -> list[Dependence]:
+def left_by(extra: np.ndarray, folder: Path, axis: dict[str, np.ndarray] = COLUMNS) -> list[Dependence]:
     """Torque that the twin of the drafted bench leaves, for an axis with `extra` torque (n,) added."""
     folder.mkdir()
-    table = {"time_s": COLUMNS["t"], "motor_angle_rad": COLUMNS["angle"], "torque_Nm": COLUMNS["torque"] + extra}
+    table = {"time_s": axis["t"], "motor_angle_rad": axis["angle"], "torque_Nm": axis["torque"] + extra}
     import_(write(folder / "log.csv", table), None, folder / "log.parquet", None, None)
     identify([folder / "log.parquet"], folder / "axis.yaml")
     prepared = prepare([read_recording(folder / "log.parquet")], [], load_bench(folder / "axis.yaml"))
@@ -45,12 +45,12 @@ def test_friction_that_grows_with_the_load_is_seen(tmp_path: Path) -> None:
 
 def test_what_is_dragged_after_a_free_play_is_seen_from_the_reversal_on(tmp_path: Path) -> None:
     """A cover that the axis carries along from the end of a play: it stays behind after each reversal."""
-    cover, drag = COLUMNS["angle"][0], []
-    for angle in COLUMNS["angle"]:
+    cover, drag = LONG["angle"][0], []
+    for angle in LONG["angle"]:
         apart = float(np.clip(angle - cover, -PLAY_RAD - RAMP_RAD, PLAY_RAD + RAMP_RAD))
         cover = angle - apart
         drag.append(np.sign(apart) * max(abs(apart) - PLAY_RAD, 0.0) / RAMP_RAD)
-    found = {one.question.name: one for one in left_by(DRAG_N_M * np.array(drag), tmp_path / "drag")}
+    found = {one.question.name: one for one in left_by(DRAG_N_M * np.array(drag), tmp_path / "drag", LONG)}
     seen = found["distance from the last reversal"]
     forwards = slice(int(np.searchsorted(seen.found.edges, seen.question.by_direction)) + 1, None)
     starts = seen.found.edges[forwards][:-1] - seen.question.by_direction

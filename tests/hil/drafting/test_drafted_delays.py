@@ -32,7 +32,7 @@ def test_a_torque_that_is_recorded_late_is_in_the_bench(late_rows: int) -> None:
 
 
 def test_samples_of_one_instant_act_half_a_row_before_they_are_held() -> None:
-    """Where the rows are long enough for least squares to tell the two apart."""
+    """Rows of 4 ms, in which least squares tell both apart."""
     every = 4
     period_s = every * float(AXIS["t"][1] - AXIS["t"][0])
     angle, torque = (AXIS[name][::every] for name in ("angle", "torque"))

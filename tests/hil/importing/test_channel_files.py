@@ -150,6 +150,23 @@ def test_a_number_before_the_unit_of_an_attribute_is_a_factor(tmp_path: Path) ->
     np.testing.assert_allclose(imported(path)["torque_n_m"], TORQUE, atol=1e-9)
 
 
+def test_counts_with_a_scale_and_their_number_per_turn_beside_a_dataset(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path, counts = tmp_path / "run.h5", 65536
+    with h5py.File(path, "w") as file:
+        file.attrs["sample_rate_Hz"] = 1000.0
+        angle = np.round(ANGLE / (2.0 * np.pi) * counts).astype(np.int32)
+        file.create_dataset("enc_pos", data=angle).attrs.update({"unit": "counts", "counts_per_rev": counts})
+        torque = np.round(TORQUE / 1e-4).astype(np.int32)
+        file.create_dataset("torque", data=torque).attrs.update({"unit": "Nm", "scale": 1e-4, "offset": 0.25})
+        told = {"unit": "Nm", "scale": 0.5}  # of numbers that may hold it already
+        file.create_dataset("torque_set", data=TORQUE).attrs.update(told)
+    found = imported(path)
+    np.testing.assert_allclose(found["motor_position_rad"], ANGLE, atol=2.0 * np.pi / counts)
+    np.testing.assert_allclose(found["torque_n_m"], TORQUE + 0.25, atol=1e-4)
+    np.testing.assert_allclose(found["torque_command_n_m"], TORQUE, atol=1e-9)
+
+
 def test_an_attribute_that_groups_give_with_different_values_is_none(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"

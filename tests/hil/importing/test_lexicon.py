@@ -39,7 +39,7 @@ def test_a_language_more_is_a_line_in_the_file(tmp_path: Path, monkeypatch: pyte
         ("  mrad: {all: mrad}", "  milliradian: {all: mrad}", r"units\.milliradian: is no unit of a map"),
         ("  fr: reel mesure", "  French: reel mesure", "allowed lines LANGUAGE: WORDS"),
         ("fr: fe}", "fr: [fe]}", "allowed lines LANGUAGE: WORDS"),
-        ("nenn(dreh)?moment", "nenn(dreh?moment", "allowed regular expressions"),
+        ("bezugs)(dreh)?moment", "bezugs)(dreh?moment", "allowed regular expressions"),
         ("hz: 1.0, khz: 1e3", "hz: 1.0, khz: fast", r"khz: given 'fast'"),
         ("  acceleration:\n", "  accelerations:\n", "quantities"),
         ("\ncommand:\n", "\ncommands:\n", "did you mean command"),

@@ -25,13 +25,13 @@ KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
 COGGING = Term("cogging_torque", 0, (0.05, 6.0, 0.4))
 MODE = Term("structural_mode", 0, (180.0, 0.02, 0.3))
-NEEDED = -0.5 * CRITERIA.evidence  # logarithm of a chance
+NEEDED = math.log(CRITERIA.significance)
 DELAY = Term("transport_delay", 1, (0.5 * KNOWN.gains.period_s,))
 
 
 def base(*terms: Term) -> Fit:
     """A twin without new terms on an axis whose torque was measured with much noise."""
-    recording = changed(recorded(KNOWN, *terms, times=2, torque_noise_n_m=0.3), torque_command_n_m=None)
+    recording = changed(recorded(KNOWN, *terms, times=6, torque_noise_n_m=0.3), torque_command_n_m=None)
     recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
     fit = fit_nominal_parameters(prepare([recording], [], OWNER).train)
     assert fit.within_noise

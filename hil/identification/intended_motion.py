@@ -16,24 +16,36 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
-from hil.identification.derivatives import matched_motion
+from hil.identification.derivatives import MeasuredMotion, matched_motion
 from hil.identification.measured import Measured
-from hil.identification.plain_model import LONGEST_S, motion_data
+from hil.identification.plain_model import LONGEST_S, MotionData, motion_data
 from hil.identification.sensor_noise import moving, white_noise
 from hil.identification.whitening import RANK
 
 _LAGS_S = (0.004, 0.008, 0.016, 0.032, 0.064, 0.128)  # of a fast loop to one without feed-forward and integrator
+_ANOTHER = 0.1  # of the variance of the acceleration: set-points that differ by more are a target, or not its own
 _LOST = 0.005  # of the variance of the acceleration: an inertia is a quarter of a per cent too large
 
 
 @lru_cache(maxsize=16)
 def intended(run: Measured) -> Measured:
     """The run with its intended motor position (n,)."""
-    command = run.position_command_m
-    scale = float(np.polyfit(command, run.motor, 1)[0]) if np.ptp(command) > 0.0 else 0.0
+    data = motion_data(run.motor, run.torque, run.period_s, run.evaluated)
+    command = run.position_command_m - np.mean(run.position_command_m)
+    size = float(command @ command)
+    scale = float(command @ run.motor) / size if size > 0.0 else 0.0
     follows = float(np.std(run.motor - scale * command)) > run.noise.motor  # else the measured position stands for it
-    fine = scale != 0.0 and white_noise(scale * command) <= run.noise.motor
-    return replace(run, motor=_of_set_points(run) if follows and fine else _slow(run))
+    if follows and scale != 0.0 and white_noise(scale * command) <= run.noise.motor:
+        motor = _of_set_points(run)
+        if _loses(data, matched_motion(motor, run.period_s, data.window)) < _ANOTHER:
+            return replace(run, motor=motor)
+    return replace(run, motor=_slow(run, data))
+
+
+def _loses(data: MotionData, moved: MeasuredMotion) -> float:
+    """Variance of the acceleration that another motion lacks, or has beyond it, over that of the measured one."""
+    own, other = (one.acceleration[data.rows] for one in (data.moved, moved))
+    return float(np.var(other - own) / max(float(np.var(own)), 1e-300)) if own.size else np.inf
 
 
 def _of_set_points(run: Measured) -> FloatArray:
@@ -57,13 +69,12 @@ def _lagged(values: FloatArray, time_constant_s: float, period_s: float) -> Floa
     return np.asarray(lfilter([1.0 - pole], [1.0, -pole], values), dtype=np.float64)
 
 
-def _slow(run: Measured) -> FloatArray:
+def _slow(run: Measured, data: MotionData) -> FloatArray:
     """The motor position (n,) through the longest mean that keeps its acceleration."""
-    data = motion_data(run.motor, run.torque, run.period_s, run.evaluated)
-    own, kept, window = data.moved.acceleration[data.rows], run.motor, data.window
+    kept, window = run.motor, data.window
     while window <= min(LONGEST_S / run.period_s, run.motor.size // 4):
         moved = matched_motion(run.motor, run.period_s, window)
-        if np.var(moved.acceleration[data.rows] - own) > _LOST * np.var(own):
+        if _loses(data, moved) > _LOST:
             break
         kept, window = moved.position, 2 * window - 1
     return kept

@@ -92,7 +92,7 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
         [one / max(row, 1.0) - part.rows / rows.sum() for one, part in zip(each, parts, strict=True)]
         for each, row in zip(inside, rows, strict=True)
     ]
-    covariance, independent = spectrum(noise, fitted, int(rows.sum())).covariance(apart)
+    covariance, independent = spectrum(noise, fitted, [part.rows for part in parts]).covariance(apart)
     if not np.trace(covariance) > 0.0 or independent < _FEWEST_INDEPENDENT * count:
         return None
     axes, size, _ = np.linalg.svd(covariance)
@@ -111,8 +111,9 @@ def offset(parts: Sequence[ResidualSeries]) -> Structure | None:
         return None
     mean, rows = float(left.mean()), left.size
     noise = [np.where(part.rows, part.left - mean, 0.0) for part in parts]
-    whole = [[part.rows / rows for part in parts]]
-    covariance, independent = spectrum(noise, [[one * rows**0.5 for one in whole[0]]], rows).covariance(whole)
+    counted = [part.rows for part in parts]
+    whole = [at / rows for at in counted]
+    covariance, independent = spectrum(noise, [[rows**0.5 * one for one in whole]], counted).covariance([whole])
     if not covariance[0, 0] > 0.0 or independent < _FEWEST_INDEPENDENT:
         return None
     variance = float(covariance[0, 0])

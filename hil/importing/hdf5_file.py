@@ -1,6 +1,5 @@
 """Read datasets of an HDF5 file with h5py, an optional library."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,12 @@ from hil.files.input_file import check_values, parsing
 from hil.files.optional_library import optional_library
 from hil.importing.channel_groups import Group, as_seconds, one_length
 from hil.importing.column_names import label
-from hil.importing.lexicon import Quantity, RowKind, lexicon
+from hil.importing.lexicon import Quantity
+from hil.importing.units import unit_named
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _FACTORS, _OFFSETS = ("scale_factor",), ("add_offset",)  # of the conventions CF for netCDF
+_SCALE, _OFFSET = "scale", "offset"  # of whole numbers; others may hold them already
 _MISSING = ("_FillValue", "missing_value")
 
 
@@ -43,10 +44,19 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
             for name, value in one.attrs.items():
                 if isinstance(value, scalars):
                     told.setdefault(name, set()).add(value)
+        beside = dict[str, set[Any]]()  # what groups or the file say goes before it
         for one in datasets:
             for name, value in one.attrs.items():
-                if isinstance(value, scalars[1:]) and not (name in _MISSING or _factor(name) or _offset(name)):
-                    told.setdefault(name, set()).add(value)
+                if isinstance(value, scalars[1:]) and name not in {
+                    *told,
+                    *_MISSING,
+                    *_FACTORS,
+                    *_OFFSETS,
+                    _SCALE,
+                    _OFFSET,
+                }:
+                    beside.setdefault(name, set()).add(value)
+        told |= beside
         texts = {name: np.array(*values) for name, values in told.items() if len(values) == 1}
     arrays, units = one_length(path, read)
     return texts | arrays, units
@@ -99,23 +109,16 @@ def _scaled(attributes: Any, values: Any) -> Any:
         return as_seconds(values)
     if values.dtype.kind not in "fiub":
         return values
-    counts = values.dtype.kind in "iu"  # others may hold the factor already
-    factors = [*_FACTORS, *(name for name in attributes if counts and _factor(name))]
-    offsets = [*_OFFSETS, *(name for name in attributes if counts and _offset(name))]
+    unit = next((_text(attributes[key]) for key in _UNITS if key in attributes), "")
+    raw = values.dtype.kind in "iu" and unit_named(unit) not in (None, "counts")  # else the unit is that of the numbers
+    factors, offsets = [*_FACTORS, *([_SCALE] if raw else [])], [*_OFFSETS, *([_OFFSET] if raw else [])]
     factor, offset = _number(attributes, factors, 1.0), _number(attributes, offsets, 0.0)
+    factor = factor if np.isfinite(factor) and factor else 1.0
     missing = [_number(attributes, [key], np.nan) for key in _MISSING]
     bad = np.isin(values, [one for one in missing if np.isfinite(one)])
     if bad.any():
         values = np.where(bad, np.nan, values.astype(np.float64))
     return values if (factor, offset) == (1.0, 0.0) else factor * values.astype(np.float64) + offset
-
-
-def _factor(name: str) -> bool:
-    return name in _FACTORS or re.fullmatch(lexicon().rows[RowKind.SCALE], name, re.IGNORECASE) is not None
-
-
-def _offset(name: str) -> bool:
-    return name in _OFFSETS or re.fullmatch(lexicon().rows[RowKind.OFFSET], name, re.IGNORECASE) is not None
 
 
 def _number(attributes: Any, names: Sequence[str], default: float) -> float:

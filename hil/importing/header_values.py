@@ -47,6 +47,7 @@ _PER = re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
 _WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
+_OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
 _IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
@@ -149,6 +150,8 @@ def _constant(told: _Statement, unit: str | None) -> tuple[bool, Constant, float
             si = value * known.units[unit]
             if constant is not Constant.PERIOD:
                 return True, constant, si
+            if told.phrase in _OF_MACHINES and not (unit and si < _LONGEST_CYCLE_S):
+                continue
             if unit or si < 1.0:  # a sampling of 1000 is a rate
                 return True, Constant.RATE, 1.0 / si
     if ratio and not any(re.search(rf"\b{other}\b", words) for other in lexicon().other_constants):

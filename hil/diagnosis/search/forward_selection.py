@@ -55,8 +55,8 @@ class Need:
 
 
 @dataclass(frozen=True, eq=False)
-class _GrownFit:
-    """The fit after a term was added and what is not needed was removed, the need of its terms, and its rivals."""
+class _Explanation:
+    """A fit without terms that are not needed, the need of each, and their rivals."""
 
     fit: Fit
     needed: dict[Key, float]
@@ -65,7 +65,7 @@ class _GrownFit:
 
 def _grown(
     additions: Additions, round_: SearchRound, nominal: Fit, tried: Collection[Sequence[tuple[str, int]]]
-) -> tuple[_GrownFit | None, list[Considered]]:
+) -> tuple[_Explanation | None, list[Considered]]:
     """Add the best of the terms that stand; one that is removed again gives its place to the next.
 
     None where all are removed again, or lead to what was `tried`. Returns the ledgers too.
@@ -83,7 +83,7 @@ def _grown(
         fit = revised(claimed(fit))
         better = not fit.terms and fit.cost < nominal.cost - CRITERIA.evidence
         if better or effects(fit.terms) not in tried:
-            return _GrownFit(fit, needed, {choice.named.fit.terms[-1].key: choice.rivals}), considered
+            return _Explanation(fit, needed, {choice.named.fit.terms[-1].key: choice.rivals}), considered
         left = [one for one in left if one.fit.terms[-1].effect != effect]
         best = first_standing(left)
     return None, [*considered, *(one.considered for one in left)]
@@ -110,7 +110,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     given, nominal = base.estimator.evaluate(base.hypothesis.given), base
     begun = given, nominal
     rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()
-    tried, fitted, exchanged_from = [effects(())], set[str](), list[tuple[Fit, dict[Key, float]]]()
+    tried, fitted, exchanged_from = [effects(())], set[str](), list[_Explanation]()
     while len(base.terms) < MOST_TERMS:
         begins = not base.terms or bool(base.data.set_aside)  # what was found above the noise, rows at rest may tell
         if begins and base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
@@ -128,11 +128,12 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         added, more = _grown(additions, round_, nominal, tried)
         considered += more
         if added is None:
+            known = rivals
             other = exchanged(base, rivals, nominal, given)
             rivals, considered = other.rivals, [*considered, *other.considered]
             if effects(other.fit.terms) not in tried:
                 step("searching on with another mechanism in the place of one")
-                exchanged_from.append((base, needed))
+                exchanged_from.append(_Explanation(base, needed, known))
                 base, needed, pruned = _pruned(other.fit, beside_loads(nominal, other.fit))
                 base, considered = claimed(base), [*considered, *pruned]
                 tried.append(effects(other.fit.terms))
@@ -153,7 +154,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
         tried.append(effects(base.terms))
         if len(base.terms) >= CRITERIA.in_vain and mismatch_left(nominal, base, base.data) > CRITERIA.most_left:
             break
-    base, needed = _best((base, needed), exchanged_from)
+    found = _best(_Explanation(base, needed, rivals), exchanged_from)
+    base, needed, rivals = found.fit, found.needed, found.rivals
     step("fitting the explanation to convergence")
     final = ended(again(revised(base).refit(ENDED), ENDED))
     kept = {term.key for term in final.terms}
@@ -164,13 +166,11 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)
 
 
-def _best(
-    last: tuple[Fit, dict[Key, float]], others: Sequence[tuple[Fit, dict[Key, float]]]
-) -> tuple[Fit, dict[Key, float]]:
+def _best(last: _Explanation, others: Sequence[_Explanation]) -> _Explanation:
     """The last explanation, or one of the `others`, which an exchange of terms left, if that is refuted beside it."""
     best = last
     for one in others:
-        if one[0].data is best[0].data and bic_margin(one[0], best[0]) >= CRITERIA.tied:
+        if one.fit.data is best.fit.data and bic_margin(one.fit, best.fit) >= CRITERIA.tied:
             best = one
     return best
 

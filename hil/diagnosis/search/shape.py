@@ -237,7 +237,7 @@ def _first_coefficient(
     splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
     series = [np.split(one, splits) for one in (signal - scaled @ solved, weights[0], *basis.T)]
     left, weight, *beside = ([spread(part, at) for part, at in zip(one, rows, strict=True)] for one in series)
-    covariance, free = spectrum(left, beside, signal.size).covariance([weight])
+    covariance, free = spectrum(left, beside, rows).covariance([weight])
     variance = float(covariance[0, 0])
     if not variance > 0.0:
         return 0.0, 0.0, 0.0

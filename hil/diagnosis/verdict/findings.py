@@ -99,16 +99,18 @@ def findings(
 
 
 def confidences(searched: Searched, final: Fit, ablations: Sequence[Ablation], held_out: Dataset) -> tuple[float, ...]:
-    """Confidence of each term of a fit, in [0, 1]."""
+    """Confidence of each term of a fit, in [0, 1]. What is left counts, but for noise up to `coloured`."""
     fits = [final.on(data) for data in (final.data, held_out) if data.runs]
     noise = like_noise(final, structure_left(final, held_out))
     missed = missed_beyond_noise(final, held_out)
     margins = [_against(searched, final, term)[2] for term in final.terms]
+
+    def left(channel: str) -> float:
+        rms = _left(fits, channel)
+        return 1.0 if channel in noise and rms**2 <= CRITERIA.coloured else rms
+
     return tuple(
-        _sure(final, index)
-        * confidence(
-            1.0 if ablation.channel in noise else _left(fits, ablation.channel), _factor(ablation), margin, missed
-        )
+        _sure(final, index) * confidence(left(ablation.channel), _factor(ablation), margin, missed)
         for index, (ablation, margin) in enumerate(zip(ablations, margins, strict=True))
     )
 

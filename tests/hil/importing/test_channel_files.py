@@ -159,7 +159,7 @@ def test_counts_with_a_scale_and_their_number_per_turn_beside_a_dataset(tmp_path
         file.create_dataset("enc_pos", data=angle).attrs.update({"unit": "counts", "counts_per_rev": counts})
         torque = np.round(TORQUE / 1e-4).astype(np.int32)
         file.create_dataset("torque", data=torque).attrs.update({"unit": "Nm", "scale": 1e-4, "offset": 0.25})
-        told = {"unit": "Nm", "scale": 0.5}  # of numbers that may hold it already
+        told = {"unit": "Nm", "scale": 0.5, "sample_rate_Hz": 250.0}  # numbers may hold it; the rate of a sensor
         file.create_dataset("torque_set", data=TORQUE).attrs.update(told)
     found = imported(path)
     np.testing.assert_allclose(found["motor_position_rad"], ANGLE, atol=2.0 * np.pi / counts)

@@ -23,7 +23,7 @@ _WIDTH = 2.0  # upper over lower frequency of a band: octaves
 _ROUNDS = 5  # of a sharpening: more make noise of it
 
 Series = Sequence[FloatArray]  # (n,) of each run, 0 in rows that do not count
-Rows = Sequence[NDArray[np.bool_]]  # (n,) of each run
+Rows = Sequence[NDArray[np.bool_]]  # that count, (n,) of each run
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,21 +3,18 @@
 A slow residual, such as that of a wrong friction law, then hides no faster effect.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
+from hil.identification.spectrum import Rows
 from hil.identification.structure import ResidualSeries, autocovariance
 
 RANK = 1e-9  # share of a column, beside the others, below which it is not told
 _ORDER = 24  # of the autoregressive model: as that of `hil.identification.inference`
 _RIDGE = 1e-4  # of white noise in the autocovariance: a filter that takes off a hundredth of the rms is far enough
-
-Rows = Sequence[NDArray[np.bool_]]
 
 
 def whitening_filter(signal: FloatArray, columns: FloatArray, rows: Rows) -> FloatArray:

@@ -28,8 +28,9 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """
     library = optional_library(path, "h5py", "h5py", "exchange")
     with parsing(path, "HDF5 file"), library.File(path, "r") as file:
-        datasets = list[Any]()
-        file.visititems(lambda name, one: datasets.append(one) if _is_own(library, one) else None)
+        every = list[Any]()
+        file.visititems(lambda name, one: every.append(one))
+        datasets = [one for one in every if _is_own(library, one)]
         values = sum(one.size * max(1, one.dtype.itemsize // 8) for one in datasets)
         check_values(path, values, f"datasets of {values} values")
         groups = dict[str, list[Any]]()
@@ -40,7 +41,7 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
         read = [group for name, members in groups.items() for group in _groups(library, name, members)]
         scalars = (str, int, float, np.integer, np.floating)
         told = dict[str, set[Any]]()
-        for one in [file, *(file[name] for name in groups if isinstance(file[name], library.Group))]:
+        for one in [file, *(one for one in every if isinstance(one, library.Group))]:
             for name, value in one.attrs.items():
                 if isinstance(value, scalars):
                     told.setdefault(name, set()).add(value)
@@ -79,8 +80,8 @@ def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
         read = _matlab(one)
         given = {key: read} if read.dtype.names is None else {field: read[field] for field in read.dtype.names}
         for own, values in given.items():
-            channels[own] = _scaled(one.attrs, values)
             units[own] = next((_text(one.attrs[key]) for key in _UNITS if key in one.attrs), "")
+            channels[own] = _scaled(one.attrs, values, units[own])
     rows = {own: len(values) for own, values in channels.items() if values.dtype.kind in "fiub" and values.size > 1}
     clocks = [own for own in rows if label(own, units.get(own, "")).quantity is Quantity.TIME]
     on_clock = [own for own in dict.fromkeys([*clocks, *rows]) if clocks and rows[own] == rows[clocks[0]]]
@@ -102,14 +103,13 @@ def _matlab(dataset: Any) -> Any:
     return np.asarray(values).T if kind else values
 
 
-def _scaled(attributes: Any, values: Any) -> Any:
-    """Values with the factor and offset of the attributes, NaN where they say that one is missing."""
+def _scaled(attributes: Any, values: Any, unit: str) -> Any:
+    """Values in a unit with the factor and offset of the attributes, NaN where they say that one is missing."""
     values = np.asarray(values)
     if values.dtype.kind == "M":
         return as_seconds(values)
     if values.dtype.kind not in "fiub":
         return values
-    unit = next((_text(attributes[key]) for key in _UNITS if key in attributes), "")
     raw = values.dtype.kind in "iu" and unit_named(unit) not in (None, "counts")  # else the unit is that of the numbers
     factors, offsets = [*_FACTORS, *([_SCALE] if raw else [])], [*_OFFSETS, *([_OFFSET] if raw else [])]
     factor, offset = _number(attributes, factors, 1.0), _number(attributes, offsets, 0.0)

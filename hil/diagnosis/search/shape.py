@@ -8,7 +8,7 @@ and of the torque that the plain model needs for it: what a term makes of the no
 r too, is no evidence.
 
 Least squares on the rows that slide: `c / error` is Student's t, with an error and degrees of freedom by the spectrum
-of what is left (`hil.identification.spectrum`). Thousands of rows together tell what hides in the noise of each one.
+of what is left (`hil.identification.spectrum`). An effect below the noise of a row shows in the mean of many rows.
 """
 
 import math

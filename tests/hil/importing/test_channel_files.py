@@ -122,15 +122,15 @@ def test_groups_of_other_rates_are_merged_by_their_stamps(ending: str, tmp_path:
     np.testing.assert_allclose(recording["torque_n_m"][::4], TORQUE[:rows:4], atol=1e-9)
 
 
-@pytest.mark.parametrize("at", ["/", "AxisX"])
-def test_the_rate_is_an_attribute_of_the_group_or_of_the_file(at: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("at", ["/", "AxisX", "settings"])
+def test_the_rate_is_an_attribute_of_a_group_or_of_the_file(at: str, tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:
         group = file.create_group("AxisX")
         for name, values, unit in (("angle", ANGLE, "rad"), ("torque", TORQUE, "Nm")):
             group.create_dataset(name, data=values).attrs["unit"] = unit
-        file[at].attrs["sample_rate_Hz"] = 1000.0
+        file.require_group(at).attrs["sample_rate_Hz"] = 1000.0
     assert imported(path).period_s == pytest.approx(1e-3)
 
 

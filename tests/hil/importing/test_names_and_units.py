@@ -10,6 +10,7 @@ from foreign_axis import axis
 
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
+from hil.importing.lexicon import Quantity
 from hil.importing.listed_names import listed_names
 from hil.importing.units import factor_and_unit, unit_named
 
@@ -92,3 +93,24 @@ def test_counts_of_a_length_are_a_factor_and_its_unit() -> None:
 )
 def test_objects_of_the_drive_profile_have_the_unit_of_the_standard(name: str, unit: str | None) -> None:
     assert label(name).unit == unit
+
+
+@pytest.mark.parametrize("name", ["torque_pct_Mn", "torque_percent_MN", "Moment_Prozent_Mnenn"])
+def test_a_percentage_is_the_unit_before_what_it_is_of(name: str) -> None:
+    assert label(name).unit == "%"
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [
+        ("stem_pos_%", Quantity.POSITION),
+        ("Drehzahl [%]", Quantity.VELOCITY),
+        ("setpoint_%", Quantity.UNKNOWN),
+        ("torque_setpoint_%", Quantity.EFFORT),
+        ("load_%", Quantity.EFFORT),
+    ],
+)
+def test_a_percentage_of_a_motion_is_no_torque(name: str, quantity: Quantity) -> None:
+    found = label(name)
+    assert found.quantity is quantity
+    assert found.odd_unit is (quantity is not Quantity.EFFORT)

@@ -123,7 +123,7 @@ def _is_sampled(recording: Recording, plant: PlantValues) -> bool:
 
 
 def _told(delay: Estimate, period_s: float) -> bool:
-    """True if a delay differs from none by more than its error."""
+    """True if a delay is told to differ from none."""
     return delay.std_error > 0.0 and sure(delay.value / period_s, delay.std_error / period_s)
 
 

@@ -56,13 +56,13 @@ def torque_deviation(every: Sequence[Dataset], slowest: SlowestSliding) -> float
 
 
 def torque_missed(fit: Fit, data: Dataset) -> float | None:
-    """Torque that the motion of a data set needs beyond that of a twin, over its deviation (rms); None: nothing slides.
+    """Torque that the motion of a data set needs beyond that of a twin, over the deviation of all recordings (rms).
 
-    Infinite where the twin does not hold the motion.
+    None where nothing slides, infinite where the twin does not hold the motion.
     """
     plain = fit_plain(fit.data) if data.runs and data.observability.torque_measured else None
-    deviation = torque_deviation([data], plain.slowest) if plain else 0.0
-    if plain is None or not deviation:
+    deviation = torque_deviation([fit.data, data], plain.slowest) if plain else 0.0
+    if plain is None or not deviation or not torque_deviation([data], plain.slowest):
         return None
     left = left_by_twin(fit.hypothesis, data, plain, deviation)
     return math.inf if left is None else left
@@ -75,7 +75,7 @@ def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
     if missed is None or plain is None or not math.isfinite(missed):
         return 0.0
     gains = [noise_gains(run.period_s, measured_motion(run).window)[0] * run.noise.torque for run in data.runs]
-    noise = float(np.sqrt(np.mean(np.square(gains)))) / torque_deviation([data], plain.slowest)
+    noise = float(np.sqrt(np.mean(np.square(gains)))) / torque_deviation([fit.data, data], plain.slowest)
     return math.sqrt(max(missed**2 - noise**2, 0.0))
 
 
@@ -101,13 +101,10 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
     found = []
     for run in data.runs:
         motion = measured_motion(run)
-        rows = np.flatnonzero(motion.sliding(model.slowest))
+        rows, a = np.flatnonzero(motion.sliding(model.slowest)), run.period_s / data.observer_s
         missing = (motion.torque - model.predict(motion.moved))[rows]
-        a = run.period_s / data.observer_s
         if rows.size:
-            bridged = np.interp(np.arange(run.motor.size), rows, missing)
-            seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], bridged)
-            found.append(np.asarray(seen, dtype=np.float64)[rows])
+            found.append(_observed(np.interp(np.arange(run.motor.size), rows, missing), a)[rows])
     return _share(found, data, model.slowest, deviation)
 
 
@@ -134,17 +131,34 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast
         motion = measured_motion(run)
         rows = motion.sliding(plain.slowest)
         innovation_with = partial(_innovation, hypothesis, run, data.observer_s, fast)
-        lacking, sticks = _lacking(innovation_with, run, motion, rows)
+        lacking, sticks = _lacking(innovation_with, run, motion, rows, run.period_s / data.observer_s)
         found.append(ResidualSeries(-lacking, rows, sticks))
     return found
 
 
-def _lacking(
-    innovation_with: Callable[[FloatArray], FloatArray], run: Measured, motion: MotionData, rows: NDArray[np.bool_]
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,), and rows in which it sticks without.
+def needed_as_input(fit: Fit) -> list[ResidualSeries]:
+    """`needed_torque` of a fit, with the steps of a search, where the torque is the input of the axis.
 
-    The torque is NaN where none moves the twin.
+    Empty under a known law, and where the twin does not hold the motion; 0 in a run that does not slide.
+    """
+    seen, plain = fit.data.observability, fit_plain(fit.data)
+    if plain is None or seen.closed_loop or not seen.torque_measured:
+        return []
+    found = needed_torque(fit.hypothesis, fit.data, plain, fast=True)
+    told = [one if one.rows.any() else one._replace(left=np.zeros(one.left.size)) for one in found]
+    return told if all(np.isfinite(one.left).all() for one in told) else []
+
+
+def _lacking(
+    innovation_with: Callable[[FloatArray], FloatArray],
+    run: Measured,
+    motion: MotionData,
+    rows: NDArray[np.bool_],
+    a: float,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Torque (n,) that a twin lacks to make the motion of a run in the rows (n,), and rows in which it sticks still.
+
+    The torque is NaN where none moves the twin; `a` is the period over the time constant of the observer.
 
     The innovation of a twin that slides tells it. Where a torque less by its noise stops one that creeps, it gets more,
     which counts as lacking, as long as fewer rows stick then.
@@ -159,13 +173,19 @@ def _lacking(
         sticks = rows & (moved < 0.5 * scale)
         if not scale > 0.0 or np.count_nonzero(sticks) >= before:
             break
-        found, stuck = innovation * _ADDED * deviation / scale + more, sticks | (more != 0.0)
+        found, stuck = innovation * _ADDED * deviation / scale + _observed(more, a), sticks
         before = np.count_nonzero(sticks)
         if before <= _FEW * np.count_nonzero(rows):
             break
         more = np.where(maximum_filter1d(sticks, motion.window), more + noise * way, more)
         noise *= 2.0
     return np.asarray(found, dtype=np.float64), stuck
+
+
+def _observed(torque: FloatArray, a: float) -> FloatArray:
+    """A torque (n,) behind the filter of the innovation."""
+    seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], torque)
+    return np.asarray(seen, dtype=np.float64)
 
 
 def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray) -> FloatArray:

@@ -83,25 +83,25 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         unit = unit_within(name, quantity)
     if unit is None and not odd and quantity is Quantity.EFFORT:
         unit = _unit_of_object(name)
-    of_unit, command = QUANTITY_OF_UNIT.get(unit or ""), _any(words, known.command)
+    of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
     if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):
         unit = "nm"
     elif unit == "rev" and quantity not in (Quantity.POSITION, Quantity.UNKNOWN):
         unit = None  # speed_rev is a reversal
-    elif unit in ("%", "permille") and (quantity in _MOTION or (command and quantity is Quantity.UNKNOWN)):
+    elif unit in ("%", "permille") and quantity in _MOTION:
         unit, odd = None, True  # a share of a stroke or of a top speed, which the file does not tell
     elif of_unit and quantity is not Quantity.OTHER and not (unit == "min" and quantity is not Quantity.TIME):
         quantity = of_unit
     elif unit and unit not in QUANTITY_OF_UNIT:
         unit = None
     steps = (of_steps or _any(words, known.steps)) and not _any(words, known.encoder)
-    if steps and quantity is Quantity.UNKNOWN and not odd and (command or len(tokens) == 1):
+    if steps and quantity is Quantity.UNKNOWN and not odd and (_any(words, known.command) or len(tokens) == 1):
         quantity, unit = Quantity.POSITION, unit or "counts"
     return Label(
         column,
         quantity,
-        command or steps,
+        _any(words, known.command) or steps,
         _any(words, known.measured),
         _any(words, known.motor),
         _any(words, known.table),

@@ -16,6 +16,7 @@ NOTHING = 0.02  # share of a column that the motion explains, below which it is 
 EXPLAINED = 0.4  # share of a torque that one mass with friction explains: gravity and springs may be more
 _DERIVED = 0.5  # share of a velocity that is the derivative of its position: less is another motion
 _FOLLOWING = 0.9  # share of a column that its velocity explains, above which it is a following error, no position
+_PLACE = 0.99  # share of a column without a word for torque that is the position, above which it is no torque
 _WEAK = 0.5  # of the share of the best column: a column of less is another axis, or a part of the torque
 
 
@@ -46,6 +47,12 @@ def choose_efforts(
     found = Efforts()
     makes_torque = any(labels[name].si == "N m" for name in names) and _turns(live, labels, moved, period_s)
     shares = {name: max(driven(live[name], moved, period_s).share, 0.0) for name in names}
+    for name in list(names):
+        one = labels[name]
+        if (one.unit in ("%", "permille") and not (one.si or one.electric)) and _is_place(live[name], moved):
+            found.left_out[name] = "a position in %, of a travel that the file does not tell"
+            names = [other for other in names if other != name]
+            del shares[name]
     best = max(shares.values(), default=0.0)
     for name in list(names):
         if (best > NOTHING > shares[name]) or (best > EXPLAINED and shares[name] < _WEAK * best):
@@ -81,6 +88,11 @@ def choose_efforts(
         if name not in (found.measured, found.command):
             found.left_out.setdefault(name, "another torque, force, current or voltage")
     return found
+
+
+def _is_place(values: FloatArray, moved: MeasuredMotion) -> bool:
+    """True if values (n,) are the position of a motion: a torque has friction and inertia of its own."""
+    return proportional(moved.position, values).share > _PLACE
 
 
 def _turns(live: dict[str, FloatArray], labels: dict[str, Label], moved: MeasuredMotion, period_s: float) -> bool:

@@ -1,6 +1,6 @@
 """Read datasets of an HDF5 file with h5py, an optional library."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ _MISSING = ("_FillValue", "missing_value")
 
 
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
-    """Datasets and fields of tables by name, texts, and attributes of their groups and of the root.
+    """Datasets and fields of tables by name, texts, and attributes of their groups, of the root and of folders beside.
 
     Units, factors and missing values are those of the attributes of a dataset, of which other numbers are read too. An
     attribute with different values in several places is left out. Links to other files are not followed.
@@ -39,28 +39,34 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
             if not folder.startswith("/#"):  # what MATLAB refers to by pointers
                 groups.setdefault(folder, []).append(one)
         read = [group for name, members in groups.items() for group in _groups(library, name, members)]
-        scalars = (str, int, float, np.integer, np.floating)
-        told = dict[str, set[Any]]()
-        for one in [file, *(one for one in every if isinstance(one, library.Group))]:
-            for name, value in one.attrs.items():
-                if isinstance(value, scalars):
-                    told.setdefault(name, set()).add(value)
-        beside = dict[str, set[Any]]()  # what groups or the file say goes before it
-        for one in datasets:
-            for name, value in one.attrs.items():
-                if isinstance(value, scalars[1:]) and name not in {
-                    *told,
-                    *_MISSING,
-                    *_FACTORS,
-                    *_OFFSETS,
-                    _SCALE,
-                    _OFFSET,
-                }:
-                    beside.setdefault(name, set()).add(value)
-        told |= beside
+        folders = [one for one in every if isinstance(one, library.Group)]
+        of_data = [file, *(one for one in folders if one.name in groups)]
+        told = _attributes(of_data)  # goes before that of a dataset, and this before that of another folder
+        of_values = {*told, *_MISSING, *_FACTORS, *_OFFSETS, _SCALE, _OFFSET}
+        told |= _attributes(datasets, of_values, texts=False)
+        told |= _attributes([one for one in folders if _is_beside(one.name, groups)], set(told))
         texts = {name: np.array(*values) for name, values in told.items() if len(values) == 1}
     arrays, units = one_length(path, read)
     return texts | arrays, units
+
+
+def _attributes(of: Sequence[Any], known: Collection[str] = (), texts: bool = True) -> dict[str, set[Any]]:
+    """Values of the attributes of folders or datasets that are numbers or texts, by a name that is not known yet."""
+    kinds, found = (int, float, np.integer, np.floating, *((str,) if texts else ())), dict[str, set[Any]]()
+    for one in of:
+        for name, value in one.attrs.items():
+            if isinstance(value, kinds) and name not in known:
+                found.setdefault(name, set()).add(value)
+    return found
+
+
+def _is_beside(folder: str, data: Collection[str]) -> bool:
+    """True for a folder without data beside all data, or beside a folder that holds all: /nameplate of /trace.
+
+    What lies beside some of the data alone is of another axis or device.
+    """
+    above = folder.rpartition("/")[0] + "/"
+    return folder not in data and all(f"{name}/".startswith(above) for name in data)
 
 
 def _is_own(library: Any, one: Any) -> bool:

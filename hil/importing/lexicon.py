@@ -146,6 +146,7 @@ class Lexicon(_Entry):
     units: dict[str, Words]
     objects: dict[Literal["permille"], Words]
     after_unit: Words
+    of_rated: Words
     constants: dict[Constant, ConstantWords]
     other_constants: Words
     joints: Words

@@ -111,9 +111,8 @@ def split_unit(name: str) -> tuple[str, str | None, bool]:
     tokens = name.split("_")
     while len(tokens) > 2 and tokens[-1].lower() in lexicon().after_unit:
         tokens.pop()
-    for place, token in enumerate(tokens[1:-1], 1):
-        if (unit := unit_named(token)) in ("%", "permille"):  # torque_pct_Mn: of what follows
-            return "_".join(tokens[:place]), unit, False
+    if len(tokens) > 2 and tokens[-1].lower() in lexicon().of_rated and unit_named(tokens[-2]) in ("%", "permille"):
+        tokens.pop()
     for take in (3, 2, 1):
         if len(tokens) > take:
             unit = unit_named("_".join(tokens[-take:]).replace("°", "deg"))

@@ -3,11 +3,12 @@
     p = 1 / (1 + exp(-s))
     s = a - b ln(1 + e / (factor - 1)) - c ln+(1 / (factor - 1)) - d ln+(1000 / (1 + margin)) - ln(1 + m / factor)
 
-with ln+ = max(ln, 0). factor is the residual energy without the term over that with it, so that 1 / (factor - 1) is the
-energy left over that which the term explains, and e ten times the share of what is left that is above the noise floor.
-m is the torque on held-out motion that the twin misses beyond noise, in shares of 3 %: where an axis is only half
-described, a name of little gain is not sure. Confidence falls with a small energy gain, more so beside a residual that
-has structure, and with a close rival. The constants are `Criteria.offset` to `plenty`.
+with ln+ = max(ln, 0). factor is the residual energy without the term over that with it, so that 1 / (factor - 1) is
+the energy left over that which the term explains, and e ten times the share of what is left that is above the noise
+floor. Below the noise of a row the energy of the torque that is missed counts, if it falls more. m is the torque on
+held-out motion that the twin misses beyond noise, in shares of 3 %: where an axis is only half described, a name of
+little gain is not sure. Confidence falls with a small energy gain, more so beside a residual that has structure, and
+with a close rival. The constants are `Criteria.offset` to `plenty`.
 """
 
 import math

@@ -8,6 +8,7 @@ also falls if its strength is within its standard error, if it worsens a channel
 if it changes only what the noise of the sensors does, see `noise_free`.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,6 +23,7 @@ from hil.diagnosis.search.force_windows import strength_told
 from hil.diagnosis.search.forward_selection import claimed
 from hil.diagnosis.search.initial_values import other_variants
 from hil.diagnosis.search.rivals import ENDED, RivalFit, more_torque
+from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.verdict.noise_free import energy_without_noise
 from hil.diagnosis.verdict.strength import strength_over_error
 from hil.identification.dataset import Dataset
@@ -46,9 +48,11 @@ class Ablation:
     that does not repeat from lap to lap. `gain` is the evidence for the term on the held-out recordings. They are None
     without held-out recordings or laps, and for an event, whose `train` is the ratio over all recordings. `acts`: the
     term changes the held-out residuals as it does those in training. `clear`: its strength is above its standard error.
+    `log_chance`: logarithm of the chance of its shape below the noise; None above it.
     `quiet`: it hardly acts on motion without noise. `torque`: that which held-out motion needs beyond that
-    of the twin, over its deviation (rms), with the term and without; None where it says nothing. `harm`:
-    each channel with it and without it.
+    of the twin, over its deviation (rms), with the term and without; None where it says nothing. `by_torque`: energy
+    of the torque missed without the term over that with it, below the noise; 1 where it is not told. `harm`: each
+    channel with it and without it.
     """
 
     term: Term
@@ -60,8 +64,10 @@ class Ablation:
     laps: float | None
     acts: bool = False
     clear: bool = True
+    log_chance: float | None = None
     quiet: bool = False
     torque: tuple[float, float] | None = None
+    by_torque: float = 1.0
     harm: Mapping[str, Harm] = field(default_factory=dict)
 
     @property
@@ -193,9 +199,11 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
 
     every = final.data.over((*final.data.runs, *held_out.runs))
 
-    def clear(index: int, term: Term, other: Fit) -> bool:
+    def clear(index: int, term: Term, other: Fit, log_chance: float | None) -> bool:
         if term.windows and not strength_told(other, term, every):
             return False
+        if log_chance is not None and log_chance < math.log(CRITERIA.significance):
+            return True
         return not final.jacobian.size or strength_over_error(final, index) > 1.0  # without a Jacobian it is not told
 
     def ablation(index: int, term: Term, other: Fit) -> Ablation:
@@ -204,6 +212,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
         own = by_channel(final, least)
         factors = {channel: value / own[channel] for channel, value in by_channel(other, least).items()}
         channel = max(factors, key=lambda name: factors[name])
+        log_chance = None if term.windows else log_chance_below_noise(final, other)
         train, more, gain = factors[channel], None, None
         if there and own_held_out:
             beyond, inside = by_channel(there, least)[channel], by_channel(own_held_out, least)[channel]
@@ -220,13 +229,26 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
             bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
-            clear(index, term, other),
+            clear(index, term, other, log_chance),
+            log_chance,
             _quiet(final, other),
             torque_of(final, other, term, held_out, given),
+            _by_torque(final, other, term, held_out),
             harm(final, other, given),
         )
 
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
+
+
+def _by_torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> float:
+    """Energy of the torque missed without a term over that with it, the lower of training and held-out recordings.
+
+    Below the noise of a row, where the energy of the position is that of the noise with a term and without; else 1.
+    """
+    every = [torque_of(fit, without, term, data) for data in (fit.data, held_out) if data.runs]
+    if term.windows or not without.within_noise or not every:
+        return 1.0
+    return min((one[1] / one[0]) ** 2 if one and one[0] > 0.0 else 1.0 for one in every)
 
 
 def _change(fit: Fit, without: Fit) -> float:

@@ -9,6 +9,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from scipy.special import ndtri_exp
+
 from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.result import Finding, Rival
@@ -110,7 +112,7 @@ def confidences(searched: Searched, final: Fit, ablations: Sequence[Ablation], h
         return 1.0 if channel in noise and rms**2 <= CRITERIA.coloured else rms
 
     return tuple(
-        _sure(final, index) * confidence(left(ablation.channel), _factor(ablation), margin, missed)
+        _sure(final, index, ablation.log_chance) * confidence(left(ablation.channel), _factor(ablation), margin, missed)
         for index, (ablation, margin) in enumerate(zip(ablations, margins, strict=True))
     )
 
@@ -144,9 +146,12 @@ def _errors(fit: Fit, index: int, deviations: Sequence[float]) -> TermErrors:
     return TermErrors(deviations[fit.hypothesis.columns(index)], strength_errors(fit, index)[strength])
 
 
-def _sure(fit: Fit, index: int) -> float:
-    """Least probability that a strength differs from no effect, whatever the distribution of its error (Chebyshev)."""
-    ratio = strength_over_error(fit, index)
+def _sure(fit: Fit, index: int, log_chance: float | None) -> float:
+    """Least probability that a strength differs from no effect, whatever the distribution of its error (Chebyshev).
+
+    Below the noise by the normal deviate of the chance of its shape, if that tells more.
+    """
+    ratio = max(strength_over_error(fit, index), 0.0 if log_chance is None else -float(ndtri_exp(log_chance)))
     return 1.0 - 1.0 / ratio**2 if ratio > 1.0 else 0.0
 
 
@@ -156,10 +161,13 @@ def _left(fits: Sequence[Fit], channel: str) -> float:
 
 
 def _factor(ablation: Ablation) -> float:
-    """Energy without a term over that with it: the lower of training and, if it acts there, held-out recordings."""
+    """Energy without a term over that with it: the lower of training and, if it acts there, held-out recordings.
+
+    Of the residual, or of the torque missed, if that tells more.
+    """
     if ablation.held_out is None or not (ablation.acts or ablation.shown):
-        return ablation.train
-    return min(ablation.train, ablation.held_out)
+        return max(ablation.train, ablation.by_torque)
+    return max(min(ablation.train, ablation.held_out), ablation.by_torque)
 
 
 def key_in_search(searched: Searched, term: Term) -> Key:

@@ -67,4 +67,6 @@ def with_less_torque(given: Judged, other: Judged) -> Judged:
 def _missed_by_plain(fit: Fit, held_out: Dataset) -> float | None:
     told = held_out.runs and held_out.observability.torque_measured
     plain = fit_plain(fit.data) if told else None
-    return None if plain is None else left_by_plain(plain, held_out, torque_deviation([held_out], plain.slowest))
+    return (
+        None if plain is None else left_by_plain(plain, held_out, torque_deviation([fit.data, held_out], plain.slowest))
+    )

@@ -134,6 +134,22 @@ def test_the_rate_is_an_attribute_of_a_group_or_of_the_file(at: str, tmp_path: P
     assert imported(path).period_s == pytest.approx(1e-3)
 
 
+def test_attributes_of_data_go_before_those_beside_and_another_axis_has_none(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        group = file.create_group("axes/X")
+        group.attrs["sample_rate_Hz"] = 1000.0
+        for name, values, unit in (("angle", ANGLE, "rad"), ("current", TORQUE, "A")):
+            group.create_dataset(name, data=values).attrs["unit"] = unit
+        file.create_group("axes/Y/nameplate").attrs["torque_constant_Nm_per_A"] = 7.0
+        file.create_group("nameplate").attrs["torque_constant_Nm_per_A"] = 2.0
+        file.create_group("calibration").attrs["sample_rate_Hz"] = 10.0
+    recording = imported(path)
+    assert recording.period_s == pytest.approx(1e-3)
+    np.testing.assert_allclose(recording["torque_n_m"], 2.0 * TORQUE, atol=1e-9)
+
+
 def test_a_number_before_the_unit_of_an_attribute_is_a_factor(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"

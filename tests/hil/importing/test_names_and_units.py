@@ -95,7 +95,7 @@ def test_objects_of_the_drive_profile_have_the_unit_of_the_standard(name: str, u
     assert label(name).unit == unit
 
 
-@pytest.mark.parametrize("name", ["torque_pct_Mn", "torque_percent_MN", "Moment_Prozent_Mnenn"])
+@pytest.mark.parametrize("name", ["torque_pct_Mn", "torque_percent_rated", "Moment_Prozent_Mnenn"])
 def test_a_percentage_is_the_unit_before_what_it_is_of(name: str) -> None:
     assert label(name).unit == "%"
 
@@ -105,7 +105,8 @@ def test_a_percentage_is_the_unit_before_what_it_is_of(name: str) -> None:
     [
         ("stem_pos_%", Quantity.POSITION),
         ("Drehzahl [%]", Quantity.VELOCITY),
-        ("setpoint_%", Quantity.UNKNOWN),
+        ("M_soll_%", Quantity.EFFORT),
+        ("motor_pct_speed", Quantity.VELOCITY),
         ("torque_setpoint_%", Quantity.EFFORT),
         ("load_%", Quantity.EFFORT),
     ],
@@ -113,4 +114,10 @@ def test_a_percentage_is_the_unit_before_what_it_is_of(name: str) -> None:
 def test_a_percentage_of_a_motion_is_no_torque(name: str, quantity: Quantity) -> None:
     found = label(name)
     assert found.quantity is quantity
-    assert found.odd_unit is (quantity is not Quantity.EFFORT)
+    assert found.unit == ("%" if quantity is Quantity.EFFORT else None)
+
+
+def test_words_after_a_percentage_keep_their_meaning() -> None:
+    assert label("torque_pct_soll").command
+    assert label("torque_pct_ist").measured
+    assert label("torque_pct_axis2").number == "2"

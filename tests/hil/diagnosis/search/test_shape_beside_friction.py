@@ -1,0 +1,95 @@
+"""Shapes and starts beside a twin with too much friction, which sticks where the axis slides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_runs import bench, changed, recorded
+from scipy.stats import norm
+
+from hil.bench.control_section import UnknownControl
+from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.search.score_test import screen_library
+from hil.diagnosis.verdict.cross_validation import _by_torque
+from hil.diagnosis.verdict.findings import _sure
+from hil.identification.dataset import Dataset
+from hil.identification.estimator import Fit
+from hil.identification.measured import Measured
+from hil.identification.nominal_fit import fit_nominal_parameters
+from hil.identification.terms import Term
+from hil.identification.torque_left import fit_plain, left_by_twin, needed_as_input, torque_deviation, torque_missed
+
+KNOWN = bench()
+OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
+COGGING = Term("cogging_torque", 0, (0.05, 6.0, 0.4))
+
+
+@pytest.fixture(scope="module")
+def without() -> Fit:
+    """A twin without the cogging of an axis whose torque was measured with much noise."""
+    recording = changed(recorded(KNOWN, COGGING, times=6, torque_noise_n_m=0.3), torque_command_n_m=None)
+    recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
+    return fit_nominal_parameters(prepare([recording], [], OWNER).train)
+
+
+def both(fit: Fit, run: Measured) -> Dataset:
+    return fit.data.over([*fit.data.runs, run])
+
+
+def more_friction(fit: Fit, factor: float) -> Fit:
+    hypothesis, x = fit.hypothesis, fit.hypothesis.x.copy()
+    index = hypothesis.nominal.index("coulomb_torque_n_m")
+    x[index] = hypothesis.coordinates[index].x(factor * hypothesis.values[index])
+    return fit.estimator.fit(hypothesis.moved(x), evaluations=1)
+
+
+def test_a_twin_that_sticks_starts_a_wave_at_its_order(without: Fit) -> None:
+    candidates = screen_library(more_friction(without, 3.0))
+    starts = [term for one in candidates for term in (one.term, *one.others) if term.effect == COGGING.effect]
+    assert COGGING.values[1] in [term.values[1] for term in starts]
+
+
+def test_a_run_that_does_not_slide_hides_no_wave_of_another(without: Fit) -> None:
+    (run,) = without.data.runs
+    still = replace(run, motor=np.full(run.motor.size, run.motor[0]))
+    moves, rests = needed_as_input(replace(without, estimator=replace(without.estimator, data=both(without, still))))
+    assert np.any(moves.left)
+    assert not np.any(rests.left)
+    assert not np.any(rests.rows)
+
+
+def test_the_energy_of_the_torque_counts_below_the_noise_alone(without: Fit) -> None:
+    fit = without.estimator.fit(without.hypothesis.with_term(COGGING))
+    none, held_out = without.data.over([]), without.data
+    told = _by_torque(fit, without, fit.terms[0], none)
+    left = [torque_missed(one, without.data) or math.nan for one in (fit, without)]
+    assert told == pytest.approx((left[1] / left[0]) ** 2)
+    assert told > 1.0
+    assert _by_torque(fit, without, fit.terms[0], held_out) == pytest.approx(told)
+    assert _by_torque(fit, more_friction(without, 3.0), fit.terms[0], none) == 1.0
+
+
+def test_a_strength_is_sure_by_its_error_or_by_its_shape(without: Fit) -> None:
+    begun = without.hypothesis.with_term(replace(COGGING, values=(1e-4, 6.0, 0.4)))
+    weak = without.estimator.fit(begun, evaluations=1)
+    assert _sure(weak, 0, None) < 0.5
+    assert _sure(weak, 0, 0.0) == _sure(weak, 0, None)
+    deviate = norm.isf(1e-3)
+    assert _sure(weak, 0, math.log(1e-3)) == pytest.approx(1.0 - 1.0 / deviate**2)
+
+
+def test_the_torque_of_a_slow_end_is_missed_as_a_share_of_that_of_all_motion(without: Fit) -> None:
+    """A part that needs hardly any torque of its own makes no error of the twin large."""
+    (run,) = without.data.runs
+    part = without.data.over([run.until(run.motor.size // 4)])
+    plain = fit_plain(without.data)
+    assert plain is not None
+    own, every = (torque_deviation(data, plain.slowest) for data in ([part], [without.data, part]))
+    assert own != pytest.approx(every, rel=1e-3)
+    wrong = without.estimator.evaluate(more_friction(without, 1.5).hypothesis)
+    missed = torque_missed(wrong, part)
+    assert missed is not None
+    assert missed * every == pytest.approx((left_by_twin(wrong.hypothesis, part, plain, own) or 0.0) * own)

@@ -69,14 +69,15 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
 
 
 def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
-    """Share of the torque that a twin misses (rms), less the white noise of the torque; 0 where it is not known."""
+    """Torque of a data set that a twin misses, less the white noise, over the deviation there (rms); 0: not known."""
     missed = torque_missed(fit, data)
     plain = fit_plain(fit.data) if missed is not None else None
     if missed is None or plain is None or not math.isfinite(missed):
         return 0.0
     gains = [noise_gains(run.period_s, measured_motion(run).window)[0] * run.noise.torque for run in data.runs]
-    noise = float(np.sqrt(np.mean(np.square(gains)))) / torque_deviation([fit.data, data], plain.slowest)
-    return math.sqrt(max(missed**2 - noise**2, 0.0))
+    own, every = (torque_deviation(sets, plain.slowest) for sets in ([data], [fit.data, data]))
+    noise = float(np.sqrt(np.mean(np.square(gains)))) / own
+    return math.sqrt(max((missed * every / own) ** 2 - noise**2, 0.0))
 
 
 def mismatch_left(before: Fit, after: Fit, data: Dataset, noise: Collection[str] = ()) -> float:

@@ -49,6 +49,11 @@ class LawCheck:
             return recording
         return replace(recording, metadata={**recording.metadata, RESAMPLED: True})
 
+    @property
+    def channels(self) -> frozenset[str]:
+        """Channels of the twin for which the law answers, and no term of the plant: its gains are told to be others."""
+        return frozenset({"command"} if self.corrections else ())
+
     def verdict(self, of_plant: Verdict) -> Verdict:
         """Verdict on plant and control law, from that on the plant."""
         if self.mismatch and of_plant in (Verdict.NO_MISMATCH, Verdict.PARAMETER_ERROR):

@@ -25,6 +25,8 @@ from hil.identification.inference import bic_gain
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import is_load
 from hil.identification.torque_left import fit_plain, mismatch_left, needed_torque
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Block
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def judge(tested: Tested) -> Judged:
     """Give the verdict; where terms do not explain the mismatch, parameters of the axis may have changed."""
     searched, final, refit = tested.searched, tested.proof.final, tested.refit
     held_out, law = searched.prepared.held_out, searched.prepared.law
-    of_plant, change = verdict_on_plant(searched.given, searched.nominal, final, held_out), None
+    of_plant, change = verdict_on_plant(searched.given, searched.nominal, final, held_out, law.channels), None
     named = of_plant is Verdict.MISSING_PHYSICS
     open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
@@ -84,12 +86,12 @@ def _with_loads(refit: Fit, final: Fit) -> Fit:
     return fit_nominal_parameters(replace(refit.data, bench=diagnosed_bench(refit.bench, loaded)))
 
 
-def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> Verdict:
-    """Give the verdict on the plant.
+def verdict_on_plant(given: Fit, nominal: Fit, final: Fit, held_out: Dataset, of_law: Collection[str] = ()) -> Verdict:
+    """Give the verdict on the plant; for the channels `of_law` the control law answers.
 
     If the terms are rejected, the first two fits decide, by the rules on a twin without new terms.
     """
-    if final.terms and accepted(explanation(nominal, final, held_out)):
+    if final.terms and accepted(explanation(nominal, final, held_out, of_law)):
         return Verdict.MISSING_PHYSICS
     matters = refit_matters(given, nominal)
     if given_stands(given, held_out):
@@ -104,13 +106,15 @@ def given_stands(given: Fit, held_out: Dataset) -> bool:
     return (given.at_floor or given.within_noise) and accepted(reproduction(given, held_out))
 
 
-def explanation(nominal: Fit, final: Fit, held_out: Dataset) -> Ledger:
-    """Answer of the rule on all terms together."""
+def explanation(nominal: Fit, final: Fit, held_out: Dataset, of_law: Collection[str] = ()) -> Ledger:
+    """Answer of the rule on all terms together; without a term of the controller the channels `of_law` do not count."""
+    of_plant = all(BY_ID[term.effect].block is not Block.CONTROLLER for term in final.terms)
+    other = frozenset(of_law if of_plant else ())
     coarse = any(run.noise.coarse for run in (*final.data.runs, *held_out.runs))
-    noise = like_noise(final, structure_left(final, held_out))
+    noise = like_noise(final, structure_left(final, held_out)) | other
     of_runs = [ratios for data in (final.data, held_out) if data.runs for ratios in final.on(data).noise_ratios]
     measured = Remainder(
-        left=unexplained_share(nominal, final, held_out),
+        left=unexplained_share(nominal, final, held_out, other),
         told=unexplained_share(nominal, final, held_out, noise),
         above=max((ratio for ratios in of_runs for name, ratio in ratios.items() if name not in noise), default=0.0),
         open_inputs=coarse or not final.data.observability.closed_loop,

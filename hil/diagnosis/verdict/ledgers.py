@@ -21,7 +21,8 @@ def ledgers(judged: Judged, forms: Container[int]) -> tuple[CandidateLedger, ...
     searched, proof = judged.tested.searched, judged.tested.proof
     together: Ledger = ()
     if proof.final.terms:
-        together = explanation(searched.nominal, proof.final, searched.prepared.held_out)
+        prepared = searched.prepared
+        together = explanation(searched.nominal, proof.final, prepared.held_out, prepared.law.channels)
     answers = {index: _candidate(one) for index, one in enumerate(searched.considered)}
     places = {one.key: index for index, one in enumerate(searched.considered) if one.added}
     for index, ablation in enumerate((*proof.ablations, *proof.dropped)):

@@ -12,7 +12,7 @@ from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
 from hil.twin.scene import Scene
 
-_MOST_S = 0.01
+_MOST_S = 0.05  # a row of a logger at 20 Hz
 _ENDS = 64  # rows by which samples are continued: the response to a corner has fallen below 1 %
 Channels = tuple[FloatArray, ...]  # motor position, table position, torque command, torque
 

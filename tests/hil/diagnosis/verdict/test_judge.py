@@ -8,12 +8,14 @@ from diagnosis_runs import bench, changed, dataset, evaluated, fitted, recorded,
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.acceptance import names_stand
+from hil.diagnosis.preparation.usable_law import LawCheck
 from hil.diagnosis.result import Verdict
 from hil.diagnosis.search.rivals import RivalFit
+from hil.diagnosis.value import Correction
 from hil.diagnosis.verdict.corrections import diagnosed_bench
 from hil.diagnosis.verdict.cross_validation import cross_validate
 from hil.diagnosis.verdict.findings import findings, renamed
-from hil.diagnosis.verdict.judge import verdict_on_plant
+from hil.diagnosis.verdict.judge import explanation, verdict_on_plant
 from hil.diagnosis.verdict.testability import not_testable
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -104,6 +106,28 @@ def test_a_mismatch_without_a_term_or_with_a_poor_one_is_unexplained() -> None:
     poor = believed(found, Term("constant_load", 0, (0.02,)))
     assert mismatch_left(plain, poor, held_out) > 0.5
     assert verdict_on_plant(plain, plain, poor, held_out) is Verdict.UNEXPLAINED
+
+
+def test_a_term_of_the_plant_answers_for_no_command_of_a_law_with_other_gains() -> None:
+    weight, lag = Term("constant_load", 0, (0.02,)), Term("velocity_filter_lag", 0, (1e-3,))
+
+    def run(seed: int) -> Dataset:
+        plain = recorded(OWNER, weight, seed=seed)
+        more = 0.1 * np.sin(0.05 * np.arange(len(plain)))
+        command = plain["torque_command_n_m"] + more
+        return dataset([take(changed(plain, torque_command_n_m=command), OWNER)], OWNER)
+
+    found, held_out = run(1), run(2)
+
+    def left(*terms: Term, of_law: frozenset[str] = frozenset()) -> float:
+        (answer,) = explanation(believed(found), believed(found, *terms), held_out, of_law)
+        return float(answer.figures["left"])
+
+    told = Correction(value=2.0, std=0.01, unit="N m s/rad", nominal=1.0)
+    of_law = LawCheck(OWNER, corrections={"velocity_gain_n_m_s_rad": told}).channels
+    assert LawCheck(OWNER).channels == frozenset()
+    assert left(weight, of_law=of_law) < 0.6 * left(weight)
+    assert left(weight, lag, of_law=of_law) == left(weight, lag)
 
 
 def test_a_name_that_is_not_believed_beside_a_twin_at_the_noise_is_no_mismatch() -> None:

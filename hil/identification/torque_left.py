@@ -137,19 +137,6 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast
     return found
 
 
-def needed_as_input(fit: Fit) -> list[ResidualSeries]:
-    """`needed_torque` of a fit, with the steps of a search, where the torque is the input of the axis.
-
-    Empty under a known law, and where the twin does not hold the motion; 0 in a run that does not slide.
-    """
-    seen, plain = fit.data.observability, fit_plain(fit.data)
-    if plain is None or seen.closed_loop or not seen.torque_measured:
-        return []
-    found = needed_torque(fit.hypothesis, fit.data, plain, fast=True)
-    told = [one if one.rows.any() else one._replace(left=np.zeros(one.left.size)) for one in found]
-    return told if all(np.isfinite(one.left).all() for one in told) else []
-
-
 def _lacking(
     innovation_with: Callable[[FloatArray], FloatArray],
     run: Measured,

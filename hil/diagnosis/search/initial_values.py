@@ -19,7 +19,6 @@ from hil.diagnosis.search import disturbance as estimate
 from hil.diagnosis.search.facts import axis_facts
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
-from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term, Window, free_slot
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Block, Mechanism, Variant
@@ -49,17 +48,10 @@ class StartPoint:
         return Term(self.effect, self.variant, self.values if values is None else values, windows=self.windows)
 
 
-def scene(
-    runs: Sequence[Measured],
-    bench: Bench,
-    blocks: Sequence[dict[str, FloatArray]],
-    observer_s: float,
-    needed: Sequence[ResidualSeries] = (),
-) -> Scene:
+def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
     """Estimate the quantities that starting values are computed from.
 
-    `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run. `needed` is the
-    torque that the motion needs beyond the twin's, where it is told: a twin that sticks shows it in no innovation.
+    `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run.
     """
     physics = bench.axis.physics()
     ratio = bench.axis.ratio_m_rad
@@ -67,11 +59,6 @@ def scene(
         estimate.disturbance(run, block["motor"], inertia(bench), observer_s)
         for run, block in zip(runs, blocks, strict=True)
     ]
-    if needed:
-        disturbances = [
-            replace(one, torque=estimate.smooth(-lacks.left, run.period_s), sliding=lacks.rows & lacks.clear)
-            for one, lacks, run in zip(disturbances, needed, runs, strict=True)
-        ]
     stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     begin_s, events = runs[longest].start.time_s, estimate.force_windows(runs[longest], disturbances[longest])

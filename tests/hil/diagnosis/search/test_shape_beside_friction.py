@@ -1,4 +1,4 @@
-"""Shapes and starts beside a twin with too much friction, which sticks where the axis slides."""
+"""What the torque tells of a term below the noise of a row, and beside a twin with too much friction."""
 
 from __future__ import annotations
 
@@ -12,18 +12,23 @@ from scipy.stats import norm
 
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.preparation.prepare import prepare
-from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.verdict.cross_validation import _by_torque
 from hil.diagnosis.verdict.findings import _sure
-from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
-from hil.identification.measured import Measured
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, left_by_twin, needed_as_input, torque_deviation, torque_missed
+from hil.identification.torque_left import (
+    fit_plain,
+    left_by_twin,
+    measured_motion,
+    needed_torque,
+    torque_deviation,
+    torque_missed,
+)
 
 KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
+COULOMB = "coulomb_torque_n_m"
 COGGING = Term("cogging_torque", 0, (0.05, 6.0, 0.4))
 
 
@@ -35,30 +40,23 @@ def without() -> Fit:
     return fit_nominal_parameters(prepare([recording], [], OWNER).train)
 
 
-def both(fit: Fit, run: Measured) -> Dataset:
-    return fit.data.over([*fit.data.runs, run])
-
-
 def more_friction(fit: Fit, factor: float) -> Fit:
     hypothesis, x = fit.hypothesis, fit.hypothesis.x.copy()
-    index = hypothesis.nominal.index("coulomb_torque_n_m")
+    index = hypothesis.nominal.index(COULOMB)
     x[index] = hypothesis.coordinates[index].x(factor * hypothesis.values[index])
     return fit.estimator.fit(hypothesis.moved(x), evaluations=1)
 
 
-def test_a_twin_that_sticks_starts_a_wave_at_its_order(without: Fit) -> None:
-    candidates = screen_library(more_friction(without, 3.0))
-    starts = [term for one in candidates for term in (one.term, *one.others) if term.effect == COGGING.effect]
-    assert COGGING.values[1] in [term.values[1] for term in starts]
-
-
-def test_a_run_that_does_not_slide_hides_no_wave_of_another(without: Fit) -> None:
-    (run,) = without.data.runs
-    still = replace(run, motor=np.full(run.motor.size, run.motor[0]))
-    moves, rests = needed_as_input(replace(without, estimator=replace(without.estimator, data=both(without, still))))
-    assert np.any(moves.left)
-    assert not np.any(rests.left)
-    assert not np.any(rests.rows)
+@pytest.mark.parametrize("factor", [1.3, 2.0])
+def test_the_torque_that_a_twin_lacks_is_told_where_it_sticks_without(without: Fit, factor: float) -> None:
+    plain, wrong = fit_plain(without.data), more_friction(without, factor)
+    assert plain is not None
+    less, more = (needed_torque(one.hypothesis, without.data, plain)[0] for one in (without, wrong))
+    rows, way = more.rows & more.clear, measured_motion(without.data.runs[0]).moved.direction
+    index = wrong.hypothesis.nominal.index(COULOMB)
+    added = wrong.hypothesis.values[index] - without.hypothesis.values[index]
+    assert np.count_nonzero(rows) > 0.95 * np.count_nonzero(more.rows)
+    assert np.median(((less.left - more.left) * way)[rows]) == pytest.approx(added, rel=0.1)
 
 
 def test_the_energy_of_the_torque_counts_below_the_noise_alone(without: Fit) -> None:

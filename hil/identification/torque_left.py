@@ -60,24 +60,29 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
 
     None where nothing slides, infinite where the twin does not hold the motion.
     """
-    plain = fit_plain(fit.data) if data.runs and data.observability.torque_measured else None
-    deviation = torque_deviation([fit.data, data], plain.slowest) if plain else 0.0
-    if plain is None or not deviation or not torque_deviation([data], plain.slowest):
+    if (found := _missed(fit, data)) is None:
         return None
-    left = left_by_twin(fit.hypothesis, data, plain, deviation)
-    return math.inf if left is None else left
+    missed, slowest = found
+    return missed / torque_deviation([fit.data, data], slowest)
 
 
 def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
     """Torque of a data set that a twin misses, less the white noise, over the deviation there (rms); 0: not known."""
-    missed = torque_missed(fit, data)
-    plain = fit_plain(fit.data) if missed is not None else None
-    if missed is None or plain is None or not math.isfinite(missed):
+    missed, slowest = _missed(fit, data) or (math.inf, None)
+    if slowest is None or not math.isfinite(missed):
         return 0.0
     gains = [noise_gains(run.period_s, measured_motion(run).window)[0] * run.noise.torque for run in data.runs]
-    own, every = (torque_deviation(sets, plain.slowest) for sets in ([data], [fit.data, data]))
-    noise = float(np.sqrt(np.mean(np.square(gains)))) / own
-    return math.sqrt(max((missed * every / own) ** 2 - noise**2, 0.0))
+    beyond = missed**2 - float(np.mean(np.square(gains)))
+    return math.sqrt(max(beyond, 0.0)) / torque_deviation([data], slowest)
+
+
+def _missed(fit: Fit, data: Dataset) -> tuple[float, SlowestSliding] | None:
+    """Torque that the motion of a data set needs beyond that of a twin (rms), where an axis slides; see above."""
+    plain = fit_plain(fit.data) if data.runs and data.observability.torque_measured else None
+    if plain is None or not torque_deviation([data], plain.slowest):
+        return None
+    missed = left_by_twin(fit.hypothesis, data, plain, 1.0)
+    return math.inf if missed is None else missed, plain.slowest
 
 
 def mismatch_left(before: Fit, after: Fit, data: Dataset, noise: Collection[str] = ()) -> float:

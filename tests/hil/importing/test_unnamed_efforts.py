@@ -36,3 +36,14 @@ def test_a_switch_is_no_torque(tmp_path: Path) -> None:
     draft = draft_map(write(tmp_path / "axis.csv", table | {"zeta": columns["torque"]}))
     assert column_of(draft, "torque_n_m") == "zeta"
     assert "state" in draft.left_out
+
+
+def test_a_column_in_percent_that_is_the_position_is_no_torque(tmp_path: Path) -> None:
+    """A valve tells its opening so; a column in % that friction and inertia make is a torque."""
+    columns = axis()
+    table = {"time_s": columns["t"], "position_rad": columns["angle"], "opening [%]": 50.0 + 3.0 * columns["angle"]}
+    draft = draft_map(write(tmp_path / "axis.csv", table | {"zeta [%]": 10.0 * columns["torque"]}))
+    assert column_of(draft, "torque_n_m") == "zeta [%]"
+    assert "a position in %" in draft.left_out["opening [%]"]
+    alone = draft_map(write(tmp_path / "alone.csv", table))
+    assert column_of(alone, "torque_n_m") == ""

@@ -14,7 +14,7 @@ from hil.files.input_file import check_values
 _WHOLE_NAN = 0x7FF0_0000_0000_0000  # an IEEE 754 number without a value, whose bits were written as a whole number
 # attributes of an element that tells of a column
 _TITLES = ("description", "name", "bezeichnung", "nom", "nome", "nombre")
-_UNITS = ("units", "unit", "einheit", "unite", "unita", "unidad", "uom")
+_UNITS = ("units", "unit", "unitstype", "einheit", "unite", "unita", "unidad", "uom")
 
 
 def xml_columns(path: Path) -> tuple[dict[str, list[Any]], dict[str, str]]:

@@ -10,7 +10,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.identification.derivatives import motion
-from hil.importing.foreign_columns import FEW_MISSING
+from hil.importing.foreign_columns import FEW_MISSING, is_slower
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.relations import NO_SPREAD, driven, proportional, roughness
 from hil.importing.roles import Roles
@@ -29,7 +29,10 @@ TOLD = 0.8  # share of the torque that the motion of each half must explain befo
 
 
 def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
-    """Refuse a column (n,) with text among its numbers, infinity, or many missing values. Raises InputError."""
+    """Refuse a column (n,) with text among its numbers, infinity, or many missing values, if it is not slower.
+
+    Raises InputError.
+    """
     for name, values in columns.items():
         if name in table.texts:
             line, text = table.texts[name]
@@ -42,15 +45,8 @@ def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
             row = int(np.argmax(np.isinf(values)))
             raise InputError(f"{table.place(row)}: {name} is infinite and no number; import the part before it")
         missing = np.isnan(values)
-        if missing.mean() <= FEW_MISSING:
+        if missing.mean() <= FEW_MISSING or is_slower(values):
             continue
-        steps = np.diff(np.flatnonzero(~missing))
-        if steps.size > 10 and steps.min() > 1 and np.ptp(steps) <= 1:
-            raise InputError(
-                f"{table.path}: {name} has a number in one row of {round(float(np.median(steps)))} only: two rates in "
-                "one file; if it has a time column of its own, write time: {column: NAME, unit: s} to its channel in a "
-                "map; else export one rate, or leave the column out by a map"
-            )
         first = int(np.argmax(missing))
         after = " and never after" if 0 < first == np.sum(~missing) else ""
         raise InputError(

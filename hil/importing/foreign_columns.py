@@ -26,6 +26,7 @@ from hil.recording.arrow_files import numbers, read_parquet
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn", ".psv")
 LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
+_FEW_ROWS = 10  # values: fewer tell no rate
 _ENDINGS = (".csv", ".mat", ".parquet", *RECORD_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
@@ -81,7 +82,7 @@ def read_foreign(
     Those of `on_change` hold their last value where they have none; those of `sparse` may have no values in many rows.
 
     Raises InputError with file, row and column: no such file or format, a missing column, text, infinity, values
-    missing in a larger share of the rows than `missing`, columns of different length.
+    missing in a larger share of the rows than `missing` of a column that is not slower, columns of different length.
     """
     check_foreign(path)
     wanted = tuple(name for name in dict.fromkeys(wanted) if name not in dates)
@@ -132,6 +133,12 @@ def read_foreign(
     checked = {name: values for name, values in (columns | stamps).items() if name not in sparse}
     _check(checked, path, place, given, missing)
     return Foreign(columns | stamps, scalars, place, notes, units)
+
+
+def is_slower(values: FloatArray) -> bool:
+    """True for a column (n,) of a slower rate than the rows: it has a value in one row of so many."""
+    steps = np.diff(np.flatnonzero(np.isfinite(values)))
+    return bool(steps.size > _FEW_ROWS and steps.min() > 1 and np.ptp(steps) <= 1)
 
 
 def _chosen(
@@ -195,7 +202,7 @@ def _check(
             )
     for name, values in columns.items():
         missing = np.isnan(values)
-        few = missing.mean() <= share
+        few = missing.mean() <= share or (share and is_slower(values))
         bad = np.flatnonzero(np.isinf(values) | (missing & ~np.bool_(few)))
         if bad.size:
             row = int(bad[0])

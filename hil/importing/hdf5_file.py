@@ -1,5 +1,6 @@
 """Read datasets of an HDF5 file with h5py, an optional library."""
 
+import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,13 @@ from hil.importing.column_names import label
 from hil.importing.lexicon import Quantity
 from hil.importing.units import unit_named
 
-_UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
+# names of attributes, in lower case
+_NAMES = ("path", "name", "label", "long_name", "title", "description")
+_SAYS_NOTHING = re.compile(r"[A-Za-z]{0,2}\d*")  # Y3, ch2, 7
+_UNITS = ("unit", "units")
 _FACTORS, _OFFSETS = ("scale_factor",), ("add_offset",)  # of the conventions CF for netCDF
-_SCALE, _OFFSET = "scale", "offset"  # of whole numbers; others may hold them already
-_MISSING = ("_FillValue", "missing_value")
+_OF_WHOLE, _OFFSETS_OF_WHOLE = ("scale", "factor"), ("offset",)  # other numbers may hold them already
+_MISSING = ("_fillvalue", "missing_value")
 
 
 def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
@@ -42,7 +46,7 @@ def load_hdf5(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
         folders = [one for one in every if isinstance(one, library.Group)]
         of_data = [file, *(one for one in folders if one.name in groups)]
         told = _attributes(of_data)  # goes before that of a dataset, and this before that of another folder
-        of_values = {*told, *_MISSING, *_FACTORS, *_OFFSETS, _SCALE, _OFFSET}
+        of_values = {*told, *_MISSING, *_FACTORS, *_OFFSETS, *_OF_WHOLE, *_OFFSETS_OF_WHOLE}
         told |= _attributes(datasets, of_values, texts=False)
         told |= _attributes([one for one in folders if _is_beside(one.name, groups)], set(told))
         texts = {name: np.array(*values) for name, values in told.items() if len(values) == 1}
@@ -55,7 +59,7 @@ def _attributes(of: Sequence[Any], known: Collection[str] = (), texts: bool = Tr
     kinds, found = (int, float, np.integer, np.floating, *((str,) if texts else ())), dict[str, set[Any]]()
     for one in of:
         for name, value in one.attrs.items():
-            if isinstance(value, kinds) and name not in known:
+            if isinstance(value, kinds) and name not in known and name.lower() not in known:
                 found.setdefault(name, set()).add(value)
     return found
 
@@ -76,9 +80,9 @@ def _is_own(library: Any, one: Any) -> bool:
 
 def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
     """Datasets of one folder: those on its clock, which comes first, and the others."""
-    channels, units = dict[str, Any](), dict[str, str]()
+    channels, units, names = dict[str, Any](), dict[str, str](), _names(datasets)
     for one in datasets:
-        key = one.name.rpartition("/")[2]
+        key = names[one.name]
         if library.check_string_dtype(one.dtype) is not None:
             if one.size == 1:
                 channels[key] = np.array(_text(one[()]))
@@ -86,7 +90,7 @@ def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
         read = _matlab(one)
         given = {key: read} if read.dtype.names is None else {field: read[field] for field in read.dtype.names}
         for own, values in given.items():
-            units[own] = next((_text(one.attrs[key]) for key in _UNITS if key in one.attrs), "")
+            units[own] = _first_text(one.attrs, _UNITS)
             channels[own] = _scaled(one.attrs, values, units[own])
     rows = {own: len(values) for own, values in channels.items() if values.dtype.kind in "fiub" and values.size > 1}
     clocks = [own for own in rows if label(own, units.get(own, "")).quantity is Quantity.TIME]
@@ -98,6 +102,15 @@ def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
         Group(folder, {own: channels[own] for own in names}, units, has_clock)
         for names, has_clock in ((on_clock, True), (rest, False))
     ]
+
+
+def _names(datasets: list[Any]) -> dict[str, str]:
+    """Names of the datasets of a folder by their paths: their own, or by an attribute if they say nothing, as Y3."""
+    own = {one.name: one.name.rpartition("/")[2] for one in datasets}
+    told = {one.name: _first_text(one.attrs, _NAMES) for one in datasets}
+    numbered = all(_SAYS_NOTHING.fullmatch(name) for name in own.values())
+    different = len(set(told.values())) == len(told) and all(told.values())
+    return told if numbered and different else own
 
 
 def _matlab(dataset: Any) -> Any:
@@ -117,7 +130,7 @@ def _scaled(attributes: Any, values: Any, unit: str) -> Any:
     if values.dtype.kind not in "fiub":
         return values
     raw = values.dtype.kind in "iu" and unit_named(unit) not in (None, "counts")  # else the unit is that of the numbers
-    factors, offsets = [*_FACTORS, *([_SCALE] if raw else [])], [*_OFFSETS, *([_OFFSET] if raw else [])]
+    factors, offsets = (*_FACTORS, *(_OF_WHOLE if raw else ())), (*_OFFSETS, *(_OFFSETS_OF_WHOLE if raw else ()))
     factor, offset = _number(attributes, factors, 1.0), _number(attributes, offsets, 0.0)
     factor = factor if np.isfinite(factor) and factor else 1.0
     missing = [_number(attributes, [key], np.nan) for key in _MISSING]
@@ -128,11 +141,21 @@ def _scaled(attributes: Any, values: Any, unit: str) -> Any:
 
 
 def _number(attributes: Any, names: Sequence[str], default: float) -> float:
-    for name in names:
-        value = np.asarray(attributes[name]) if name in attributes else np.empty(0)
-        if value.size == 1 and value.dtype.kind in "fiub":
-            return float(value.reshape(-1)[0])
+    for value in _named(attributes, names):
+        number = np.asarray(value)
+        if number.size == 1 and number.dtype.kind in "fiub":
+            return float(number.reshape(-1)[0])
     return default
+
+
+def _first_text(attributes: Any, names: Sequence[str]) -> str:
+    return next((text for value in _named(attributes, names) if (text := _text(value))), "")
+
+
+def _named(attributes: Any, names: Sequence[str]) -> list[Any]:
+    """Values of the attributes of some names, in the order of these, in lower case or not."""
+    given = {key.lower(): key for key in attributes}
+    return [attributes[given[name]] for name in names if name in given]
 
 
 def _text(value: Any) -> str:

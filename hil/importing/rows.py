@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
+from hil.importing.foreign_columns import is_slower
 from hil.importing.held_samples import kept_rows, lost_samples, slower
 from hil.importing.slow_gaps import late_stamps, moving_little, with_gaps_filled
 from hil.importing.spikes import lone_values
@@ -54,12 +55,20 @@ def complete_rows(
     good = np.logical_and.reduce([np.isfinite(values) for values in columns.values()])
     rows = distinct.rows[good[distinct.rows]]
     if not good.all():
-        lacking = ", ".join(name for name, values in columns.items() if not np.isfinite(values).all())
-        first = int(np.flatnonzero(~good)[0]) + 1
-        notes.append(
-            f"missing: {np.sum(~good)} rows have no value of {lacking} (first row {first} of the numbers) and are left "
-            "out: interpolated where they are few, else cut like a gap"
-        )
+        lacking = [name for name, values in columns.items() if not np.isfinite(values).all()]
+        slow = [name for name in lacking if is_slower(columns[name])]
+        if slow:
+            notes.append(
+                f"rates: {', '.join(slow)}: of a slower rate than the rows; of {good.size} rows those are taken in "
+                "which all have a value"
+            )
+        if others := [name for name in lacking if name not in slow]:
+            bad = ~np.logical_and.reduce([np.isfinite(columns[name]) for name in others])
+            first = int(np.argmax(bad)) + 1
+            notes.append(
+                f"missing: {np.sum(bad)} rows have no value of {', '.join(others)} (first row {first} of the numbers) "
+                "and are left out: interpolated where they are few, else cut like a gap"
+            )
     told = {name: values[rows] for name, values in columns.items() if name != "time_s"}
     lost = lost_samples(told) if rows_per_sample is None else np.zeros(rows.size, dtype=np.bool_)
     if lost.any():

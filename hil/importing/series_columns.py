@@ -22,7 +22,8 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
     """The columns of such rows, by a sample of them in the order of the file; None for rows of all channels.
 
     One column holds values that differ within a channel; columns of words name the channel: those that are needed so
-    that its stamps go forwards. A single channel in the sample is one only if the header says so.
+    that its stamps go forwards, and do not begin anew. A single channel in the sample is one only if the header says
+    so.
     """
     if len(names) > _MOST_COLUMNS:
         return None
@@ -51,9 +52,9 @@ def find_series(names: Sequence[str], rows: Sequence[Sequence[str]], form: Numbe
     for name in sorted(named, key=lambda name: name not in told):
         if len(set(channels(channel))) == 1:
             channel = [name] if len(set(columns[name])) > 1 else channel
-        elif _forwards(stamps, channels([*channel, name]), 0.0) > _forwards(stamps, channels(channel), 0.0) + _MORE:
+        elif _needed(stamps, channels(channel), channels([*channel, name])):
             channel = [*channel, name]
-    channel.sort(key=names.index)
+    channel.sort(key=lambda name: (name in told, names.index(name)))  # of a path the last words count
     groups = channels(channel)
     several = len(set(groups)) > 1
     if len(set(groups)) > len(rows) / _FEWEST or _forwards(stamps, groups) < _FORWARDS:
@@ -100,6 +101,21 @@ def _forwards(stamps: Sequence[float], groups: Sequence[tuple[str, ...]], least:
         last[group] = stamp
     ways = [sum(way * step > least for step in steps) for way in (1.0, -1.0)]
     return max(ways) / len(steps) if steps else 0.0
+
+
+def _needed(stamps: Sequence[float], groups: Sequence[tuple[str, ...]], more: Sequence[tuple[str, ...]]) -> bool:
+    """True if stamps go forwards in more steps within the channels `more` than within `groups`, or begin anew less."""
+    better = _forwards(stamps, more, 0.0) > _forwards(stamps, groups, 0.0) + _MORE
+    return better or _begins(stamps, more) < _begins(stamps, groups)
+
+
+def _begins(stamps: Sequence[float], groups: Sequence[tuple[str, ...]]) -> int:
+    """Steps within a channel that go back by most of the time of all stamps: another series begins there."""
+    last, begins = dict[tuple[str, ...], float](), 0
+    for stamp, group in zip(stamps, groups, strict=True):
+        begins += last.get(group, stamp) - stamp > _MOSTLY * (max(stamps) - min(stamps))
+        last[group] = stamp
+    return begins
 
 
 def _differs(column: Sequence[str], groups: Sequence[tuple[str, ...]]) -> bool:

@@ -183,6 +183,25 @@ def test_counts_with_a_scale_and_their_number_per_turn_beside_a_dataset(tmp_path
     np.testing.assert_allclose(found["torque_command_n_m"], TORQUE, atol=1e-9)
 
 
+def test_datasets_with_numbers_for_names_have_those_of_an_attribute(tmp_path: Path) -> None:
+    """As a rapid prototyping system writes them: /Measurement/Y3 with Path, Unit and Factor."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        folder = file.create_group("Measurement")
+        for name, values, about in (
+            ("X", np.arange(ANGLE.size) * 1e-3, {"Path": "currentTime", "Unit": "s"}),
+            ("Y0", ANGLE / (2.0 * np.pi), {"Path": "Model/Encoder/Position", "Unit": "rev"}),
+            ("Y1", np.round(TORQUE / 1e-4).astype(np.int32), {"Path": "Model/Torque", "Unit": "Nm", "Factor": 1e-4}),
+            ("Y2", np.full(ANGLE.size, 560.0), {"Path": "Model/ADC/U_DC", "Unit": "V"}),
+        ):
+            folder.create_dataset(name, data=values).attrs.update(about)
+    found = imported(path)
+    assert found.metadata["channels"]["torque_n_m"]["column"] == "Model/Torque"
+    np.testing.assert_allclose(found["motor_position_rad"], ANGLE, atol=1e-9)
+    np.testing.assert_allclose(found["torque_n_m"], TORQUE, atol=1e-4)
+
+
 def test_an_attribute_that_groups_give_with_different_values_is_none(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"

@@ -79,6 +79,15 @@ TABLES = {
             )
         ),
     ],
+    "two axes one after the other, told by a tag": [
+        "time,value,field,axis",
+        *(
+            f"{T[k]:.4f},{values[k]:.6f},{name},{axis}"
+            for axis, factor in (("A1", 1.0), ("A2", 0.3))
+            for name, values in (("angle_deg", factor * DEG), ("torque_Nm", factor * TORQUE))
+            for k in range(T.size)
+        ),
+    ],
     "numbers of rows, texts and bad values": [
         '"id","timestamp","tag","value","quality"',
         *(

@@ -48,8 +48,10 @@ class Criteria:
     worse: float = 1.1**2
     paid: float = 0.1
 
-    # Share of the torque's deviation (rms) by which correct simulations of one axis differ: less is no worse.
+    # Share of the torque's deviation (rms) by which correct simulations of one axis differ: less is no worse. And that
+    # of the least structure or shape: no sealed simulated axis without an effect has one above it.
     discrepancy: float = DISCREPANCY
+    least_torque: float = 0.001
 
     # Windows of a force: energy per row inside over that outside (twice the rms, for edges between two rows), share of
     # the energy inside that the best constant leaves of one push (0.19 of half a sine, 0.25 of a triangle), level over
@@ -72,7 +74,6 @@ class Criteria:
     # may leave as much rms there as the noise twice.
     elsewhere: float = 4.0
     change: float = 0.9  # of the energy above the noise that a change of the axis explains; less has another cause
-    law_parts: float = 0.5  # of the mean square above the noise that further parts of a control law must remove
     setting: float = 1e-3  # relative change of a gain that is a correction: settings have three digits
     visible: float = 2.0  # factor on the evidence that a designed motion must show, which is simulated
 

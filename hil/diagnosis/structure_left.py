@@ -3,8 +3,8 @@
 A residual within its noise says that the rows of a channel are explained one by one; thousands of rows together tell
 far less than the noise of one. Each channel is asked over each quantity (`hil.identification.structure`). A dependence
 counts if chance makes it in less than the level of significance over the number of questions, if it holds on held-out
-recordings, and if it is material: a torque above the share by which correct simulations of one axis differ, a
-difference of the encoders against their noise.
+recordings, and if it is material: a torque above a thousandth of its deviation, a difference of the encoders against
+their noise.
 """
 
 from collections.abc import Iterator, Sequence
@@ -264,7 +264,7 @@ def least_energy(data: Dataset, channel: str, plain: PlainModel) -> float:
     A creeping encoder stays within a count, and the counts of two of them beat: that of two encoders is their noise.
     """
     if channel == TORQUE:
-        return (CRITERIA.discrepancy * torque_deviation([data], plain.slowest)) ** 2
+        return (CRITERIA.least_torque * torque_deviation([data], plain.slowest)) ** 2
     return float(np.mean([run.noise.table_m**2 for run in data.runs]))
 
 

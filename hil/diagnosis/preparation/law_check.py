@@ -105,7 +105,7 @@ def _best(runs: Sequence[Measured], bench: Bench, given: LawFit, by_loop: bool) 
     if not right:
         return coarse or preferred(tried)
     found = preferred(right)
-    return coarse if coarse and found.ratio - 1.0 > CRITERIA.law_parts * (coarse.ratio - 1.0) else found
+    return coarse if coarse and found.ratio - 1.0 > CRITERIA.most_left * (coarse.ratio - 1.0) else found
 
 
 def _is_coarse(runs: Sequence[Measured], found: LawFit) -> bool:

@@ -60,8 +60,8 @@ def log_chance_below_noise(fit: Fit, without: Fit) -> float | None:
 def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) -> float:
     """Logarithm of the probability that chance makes the shape of one of all mechanisms in what a fit leaves.
 
-    By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than what correct
-    simulations of one axis differ by, and for a `fitted` shape that leaves more at its own size: of the size c the term
+    By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than the least energy
+    that counts, and for a `fitted` shape that leaves more at its own size: of the size c the term
     has 1, and removes (2 c - 1) / c^2 of what the shape removes. Others are simulated with the steps of a search.
     """
     fast = not fitted

@@ -40,7 +40,7 @@ class Criteria:
     # Share of a removed energy, 1/20 in rms, below which the remainder may be due to another form of the same law.
     form: float = 0.0025
     clear: float = 0.7  # cost with a term over that without it, below which its evidence needs no converged fit
-    most_left: float = 0.5  # share of the energy above the noise; terms that leave more do not explain the mismatch
+    most_left: float = 0.5  # share of the energy above the noise; terms or laws that leave more do not explain it
     in_vain: int = 3  # terms that leave more than `most_left`, after which the search ends
     # A channel pays if its mean square grows by 10 % in rms, which is above a trade within the model discrepancy, and
     # by a tenth of all that the term explains: a real effect leaves the others a little wrong as long as something is
@@ -48,10 +48,9 @@ class Criteria:
     worse: float = 1.1**2
     paid: float = 0.1
 
-    # Share of the torque's deviation (rms) by which correct simulations of one axis differ: less is no worse. And that
-    # of the least structure or shape: no sealed simulated axis without an effect has one above it.
+    # Share of the torque's deviation (rms) by which correct simulations of one axis differ: less is no worse.
     discrepancy: float = DISCREPANCY
-    least_torque: float = 0.001
+    least_torque: float = 0.001  # share of the torque's deviation (rms) of the least structure or shape
 
     # Windows of a force: energy per row inside over that outside (twice the rms, for edges between two rows), share of
     # the energy inside that the best constant leaves of one push (0.19 of half a sine, 0.25 of a triangle), level over

@@ -79,6 +79,8 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     clock = the_map.time.column if the_map.time is not None else "sample_rate_hz"
     positions = [name for name in (the_map.axis.motor_position, the_map.axis.table_position) if name in raw]
     complete = complete_rows(raw, the_map.rows_per_sample, positions)
+    if not complete.rows.size:
+        raise InputError(f"{source}: no row has a value of each of {', '.join(wanted)}; leave out the slower channels")
 
     def place(row: int) -> str:
         at = int(complete.rows[row])

@@ -79,6 +79,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     parts = [_words(plain_words(part)) for part in reversed(re.split(r"[./:]", name))]
     found = sorted((_found(part) for part in (*parts, beside)), key=lambda one: one[1])  # a letter says least
     quantity, letter = next((one for one in found if one != _NOTHING), _NOTHING)
+    if len(tokens) == 1 and tokens[0] in known.stamps:
+        quantity, letter = Quantity.TIME, False
     if unit is None and not odd and not letter and quantity is not Quantity.UNKNOWN:
         unit = unit_within(name, quantity)
     if unit is None and not odd and quantity is Quantity.EFFORT:
@@ -98,11 +100,13 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
     steps = (of_steps or _any(words, known.steps)) and not _any(words, known.encoder)
     if steps and quantity is Quantity.UNKNOWN and not odd and (_any(words, known.command) or len(tokens) == 1):
         quantity, unit = Quantity.POSITION, unit or "counts"
+    measured = _any(words, known.measured)
+    planned = not measured and quantity in _MOTION and _any(words, known.planned)
     return Label(
         column,
         quantity,
-        _any(words, known.command) or steps,
-        _any(words, known.measured),
+        _any(words, known.command) or planned or steps,
+        measured,
         _any(words, known.motor),
         _any(words, known.table),
         index[1] if index else _axis(tokens),

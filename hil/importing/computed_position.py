@@ -15,10 +15,6 @@ _OF_COUNTS = 0.3  # of the noise that counting gives: less is a step by chance, 
 _OF_DIGITS = 2.0  # times the noise that rounding gives: more is a sensor's
 _DECIMAL = 1e-3  # relative deviation of a step from a power of ten: noise is in it
 
-# At rest: rows of one value, half of which an axis may take to settle; share of the steps by which a sensor changes.
-_RESTING_ROWS, _UNSTEADY = 40, 0.1
-_SAME_STEP = 1.5  # times the step of another position: rounding of both
-
 _LIKE, _LIKE_SHARE = 0.01, 0.98  # a set-point is in the unit of the motion, and following errors are below 5 %
 _CLEARLY = 10.0  # difference of log likelihoods from which one of two motions answers the torque better
 
@@ -34,17 +30,13 @@ def computed_one(positions: dict[str, FloatArray], plain: list[str]) -> Computed
     """Find the set-point among positions (n,); `plain` are those whose names say neither set-point nor encoder.
 
     It has clearly less noise than the others, or nothing but the rounding of its digits where the others have the
-    counts of encoders, or none at rest where the others have some. Else a column with such counts is no set-point.
+    counts of encoders. A column with such counts is no set-point.
     """
     noises = {name: noise(values) for name, values in positions.items()}
     rounded = {name: _rounding(values, noises[name] * float(np.std(values))) for name, values in positions.items()}
     for name in plain:
         others = [other for other in positions if other != name]
-        if not others:
-            continue
-        if all(_stands_still(positions[name], positions[other]) for other in others):
-            return Computed([name], f"it stands still where {' and '.join(others)} of no finer step does not")
-        if rounded[name] == "counts":
+        if rounded[name] == "counts" or not others:
             continue
         if noises[name] < QUIET * min(noises[other] for other in others):
             return Computed([name], f"it has less noise than {others[-1]}")
@@ -68,19 +60,6 @@ def unanswered_one(two: dict[str, FloatArray], efforts: list[FloatArray], period
     gain = 0.5 * one.size * float(np.log(left[worse] / max(left[better], 1e-12)))
     why = f"inertia and friction of {better} explain the torque better"
     return Computed([worse], why) if gain > _CLEARLY else Computed([], "")
-
-
-def _stands_still(computed: FloatArray, measured: FloatArray) -> bool:
-    """True if a position (n,) stays at one value at rest, where another one (n,), in steps of no less, does not."""
-    changes = np.flatnonzero(np.diff(computed))
-    ends = np.r_[changes, computed.size - 1]
-    begins = np.r_[0, changes + 1]
-    settled = [slice((a + b) // 2, b + 1) for a, b in zip(begins, ends, strict=True) if b - a > _RESTING_ROWS]
-    steps = np.concatenate([np.zeros(0), *(np.diff(measured[part]) for part in settled)])
-    step, other = count_of(computed), count_of(measured)
-    factor = abs(proportional(measured, computed).factor)
-    as_fine = step is None or (other is not None and step * factor < _SAME_STEP * other)
-    return as_fine and steps.size > _RESTING_ROWS and float(np.mean(steps != 0.0)) > _UNSTEADY
 
 
 def _rounding(values: FloatArray, noise_abs: float) -> str:

@@ -10,10 +10,11 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.errors import InputError
 from hil.identification.derivatives import motion
-from hil.importing.foreign_columns import FEW_MISSING, is_slower
+from hil.importing.foreign_columns import FEW_MISSING
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.relations import NO_SPREAD, driven, proportional, roughness
 from hil.importing.roles import Roles
+from hil.importing.slow_columns import rows_per_value
 from hil.recording.stamps import GAP_STEPS
 
 NO_ORDER = 1.0  # roughness from which rows have no order: 1.4 for white noise, below 0.3 for a motion
@@ -45,13 +46,15 @@ def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
             row = int(np.argmax(np.isinf(values)))
             raise InputError(f"{table.place(row)}: {name} is infinite and no number; import the part before it")
         missing = np.isnan(values)
-        if missing.mean() <= FEW_MISSING or is_slower(values):
+        if missing.mean() <= FEW_MISSING or rows_per_value(values):
             continue
         first = int(np.argmax(missing))
         after = " and never after" if 0 < first == np.sum(~missing) else ""
+        scattered = np.median(np.diff(np.flatnonzero(~missing), prepend=-1)) > 1.0
+        remedy = "export one rate, or leave it out by a map" if scattered else "import the part of the file before it"
         raise InputError(
             f"{table.path}: {name} has no number in {100.0 * missing.mean():.3g} % of the rows, first in "
-            f"{table.place(first).removeprefix(f'{table.path}: ')}{after}; import the part of the file before it"
+            f"{table.place(first).removeprefix(f'{table.path}: ')}{after}; {remedy}"
         )
 
 

@@ -21,6 +21,7 @@ from hil.importing.lexicon import Quantity
 from hil.importing.map_draft import DraftedChannel, MapDraft, ask_column
 from hil.importing.map_file import ChannelSource
 from hil.importing.on_change import columns_on_change, held
+from hil.importing.one_rate import use_one_rate
 from hil.importing.questions import effort_unit, position_unit
 from hil.importing.roles import Roles, find_roles, may_be_asked
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
@@ -70,6 +71,7 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
         _list_the_rest(draft, given, times)
         return draft
     _refuse_same_name(table, roles.used)
+    use_one_rate(path, columns, roles)
     used = {name: columns[name] for name in roles.used}
     refuse_missing(table, used)
     # only now it is known which columns must be complete, and which repeat when a sample does

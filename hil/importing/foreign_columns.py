@@ -18,6 +18,7 @@ from hil.importing.map_file import CsvOptions
 from hil.importing.mat_file import mat_column, mat_scalar
 from hil.importing.on_change import held
 from hil.importing.records import RECORD_ENDINGS, read_records
+from hil.importing.slow_columns import rows_per_value
 from hil.importing.text_lines import header_names, line_of, split_line
 from hil.importing.text_rows import Cell, TextRows, read_rows
 from hil.importing.variables import VARIABLE_ENDINGS, load_variables
@@ -26,7 +27,6 @@ from hil.recording.arrow_files import numbers, read_parquet
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".tab", ".dat", ".asc", ".log", ".lvm", ".prn", ".psv")
 LARGEST = 1e100  # of a measured number
 FEW_MISSING = 0.05  # share of rows without a value: more is a channel of another rate, or a damaged file
-_FEW_ROWS = 10  # values: fewer tell no rate
 _ENDINGS = (".csv", ".mat", ".parquet", *RECORD_ENDINGS, *VARIABLE_ENDINGS[1:], *TEXT_ENDINGS[1:])
 
 
@@ -135,12 +135,6 @@ def read_foreign(
     return Foreign(columns | stamps, scalars, place, notes, units)
 
 
-def is_slower(values: FloatArray) -> bool:
-    """True for a column (n,) of a slower rate than the rows: it has a value in one row of so many."""
-    steps = np.diff(np.flatnonzero(np.isfinite(values)))
-    return bool(steps.size > _FEW_ROWS and steps.min() > 1 and np.ptp(steps) <= 1)
-
-
 def _chosen(
     path: Path, rows: TextRows, wanted: Collection[str], dates: Collection[str]
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
@@ -202,8 +196,8 @@ def _check(
             )
     for name, values in columns.items():
         missing = np.isnan(values)
-        few = missing.mean() <= share or (share and is_slower(values))
-        bad = np.flatnonzero(np.isinf(values) | (missing & ~np.bool_(few)))
+        few = bool(missing.mean() <= share) or (share > 0.0 and rows_per_value(values) is not None)
+        bad = np.flatnonzero(np.isinf(values) | (missing & (not few)))
         if bad.size:
             row = int(bad[0])
             raise InputError(

@@ -1,22 +1,25 @@
 """Read datasets of an HDF5 file with h5py, an optional library."""
 
 import re
+from collections import Counter
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hil.errors import InputError
 from hil.files.input_file import check_values, parsing
 from hil.files.optional_library import optional_library
 from hil.importing.channel_groups import Group, as_seconds, one_length
 from hil.importing.column_names import label
 from hil.importing.lexicon import Quantity
+from hil.importing.number_form import NumberForm, numbers_of
 from hil.importing.units import unit_named
 
 # names of attributes, in lower case
-_NAMES = ("path", "name", "label", "long_name", "title", "description")
-_SAYS_NOTHING = re.compile(r"[A-Za-z]{0,2}\d*")  # Y3, ch2, 7
+_NAMES = ("path", "name", "label", "title")
+_SAYS_NOTHING = re.compile(r"[A-Za-z]{0,2}\d+|[XY]")  # Y3, ch2, 7
 _UNITS = ("unit", "units")
 _FACTORS, _OFFSETS = ("scale_factor",), ("add_offset",)  # of the conventions CF for netCDF
 _OF_WHOLE, _OFFSETS_OF_WHOLE = ("scale", "factor"), ("offset",)  # other numbers may hold them already
@@ -91,7 +94,7 @@ def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
         given = {key: read} if read.dtype.names is None else {field: read[field] for field in read.dtype.names}
         for own, values in given.items():
             units[own] = _first_text(one.attrs, _UNITS)
-            channels[own] = _scaled(one.attrs, values, units[own])
+            channels[own] = _scaled(one, own, values, units[own])
     rows = {own: len(values) for own, values in channels.items() if values.dtype.kind in "fiub" and values.size > 1}
     clocks = [own for own in rows if label(own, units.get(own, "")).quantity is Quantity.TIME]
     on_clock = [own for own in dict.fromkeys([*clocks, *rows]) if clocks and rows[own] == rows[clocks[0]]]
@@ -105,12 +108,17 @@ def _groups(library: Any, name: str, datasets: list[Any]) -> list[Group]:
 
 
 def _names(datasets: list[Any]) -> dict[str, str]:
-    """Names of the datasets of a folder by their paths: their own, or by an attribute if they say nothing, as Y3."""
-    own = {one.name: one.name.rpartition("/")[2] for one in datasets}
-    told = {one.name: _first_text(one.attrs, _NAMES) for one in datasets}
-    numbered = all(_SAYS_NOTHING.fullmatch(name) for name in own.values())
-    different = len(set(told.values())) == len(told) and all(told.values())
-    return told if numbered and different else own
+    """Names of the datasets of a folder by their paths: their own, or by an attribute if they say nothing, as Y3.
+
+    The first attribute counts that no other dataset has, too.
+    """
+    names = {one.name: one.name.rpartition("/")[2] for one in datasets}
+    told = {one.name: [_first_text(one.attrs, [key]) for key in _NAMES] for one in datasets}
+    given = Counter(text for texts in told.values() for text in set(texts))
+    for path, texts in told.items():
+        own = next((text for text in texts if text and given[text] == 1 and text not in names.values()), "")
+        names[path] = own if own and _SAYS_NOTHING.fullmatch(names[path]) else names[path]
+    return names
 
 
 def _matlab(dataset: Any) -> Any:
@@ -122,30 +130,40 @@ def _matlab(dataset: Any) -> Any:
     return np.asarray(values).T if kind else values
 
 
-def _scaled(attributes: Any, values: Any, unit: str) -> Any:
-    """Values in a unit with the factor and offset of the attributes, NaN where they say that one is missing."""
+def _scaled(dataset: Any, name: str, values: Any, unit: str) -> Any:
+    """Values in a unit with the factor and offset of the attributes, NaN where they say that one is missing.
+
+    Raises InputError: a factor of whole numbers that is no number but 0, or two different ones.
+    """
     values = np.asarray(values)
     if values.dtype.kind == "M":
         return as_seconds(values)
     if values.dtype.kind not in "fiub":
         return values
-    raw = values.dtype.kind in "iu" and unit_named(unit) not in (None, "counts")  # else the unit is that of the numbers
+    known = unit_named(unit) if unit else label(name).unit
+    raw = values.dtype.kind in "iu" and known not in (None, "counts")  # else the unit is that of the numbers
     factors, offsets = (*_FACTORS, *(_OF_WHOLE if raw else ())), (*_OFFSETS, *(_OFFSETS_OF_WHOLE if raw else ()))
-    factor, offset = _number(attributes, factors, 1.0), _number(attributes, offsets, 0.0)
-    factor = factor if np.isfinite(factor) and factor else 1.0
-    missing = [_number(attributes, [key], np.nan) for key in _MISSING]
-    bad = np.isin(values, [one for one in missing if np.isfinite(one)])
+    given = dict.fromkeys(_numbers(dataset.attrs, factors))
+    if len(given) > 1 or any(not np.isfinite(one) or not one for one in given):
+        told, place = ", ".join(f"{one:g}" for one in given), f"{dataset.file.filename}: {dataset.name}"
+        raise InputError(f"{place}: given the factor {told}, allowed one finite number but 0; correct the attribute")
+    factor, offset = next(iter(given), 1.0), next(iter(_numbers(dataset.attrs, offsets)), 0.0)
+    bad = np.isin(values, [one for one in _numbers(dataset.attrs, _MISSING) if np.isfinite(one)])
     if bad.any():
         values = np.where(bad, np.nan, values.astype(np.float64))
     return values if (factor, offset) == (1.0, 0.0) else factor * values.astype(np.float64) + offset
 
 
-def _number(attributes: Any, names: Sequence[str], default: float) -> float:
+def _numbers(attributes: Any, names: Sequence[str]) -> list[float]:
+    """Attributes of some names that are numbers, also as texts; NaN of another text."""
+    found = []
     for value in _named(attributes, names):
         number = np.asarray(value)
         if number.size == 1 and number.dtype.kind in "fiub":
-            return float(number.reshape(-1)[0])
-    return default
+            found.append(float(number.reshape(-1)[0]))
+        elif text := _text(value):
+            found.append(float(numbers_of([text], NumberForm())[0][0]))
+    return found
 
 
 def _first_text(attributes: Any, names: Sequence[str]) -> str:
@@ -153,13 +171,13 @@ def _first_text(attributes: Any, names: Sequence[str]) -> str:
 
 
 def _named(attributes: Any, names: Sequence[str]) -> list[Any]:
-    """Values of the attributes of some names, in the order of these, in lower case or not."""
-    given = {key.lower(): key for key in attributes}
-    return [attributes[given[name]] for name in names if name in given]
+    """Values of the attributes of some names, of which one is in lower case, in the order of these."""
+    given = [(name, key) for name in names for key in attributes if key.lower() == name]
+    return [attributes[key] for _, key in given]
 
 
 def _text(value: Any) -> str:
     """A text, which libraries store as text, bytes, or an array of one of them."""
-    one = np.asarray(value).reshape(-1)
+    one = np.asarray("" if getattr(value, "shape", ()) is None else value).reshape(-1)  # h5py.Empty has none
     first = one[0] if one.size else ""
     return first.decode(errors="replace") if isinstance(first, bytes) else str(first)

@@ -128,6 +128,8 @@ class Lexicon(_Entry):
     quantities: dict[Quantity, Words]
     alone: Words
     command: Words
+    planned: Words
+    stamps: Words
     measured: Words
     motor: Words
     table: Words

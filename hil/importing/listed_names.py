@@ -1,4 +1,4 @@
-"""Names of columns that lines above the numbers list by their place: "channel 1 = x_mm", "; #1 Pos", "A[0]=Count"."""
+"""Names of columns that lines above the numbers list by their place: "channel 1 = x_mm", "; #1 Pos [um] ; #2 Vel"."""
 
 import re
 from collections.abc import Sequence
@@ -30,8 +30,7 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int, counted: bool
     """
     words = "|".join(lexicon().enumerated)
     place = re.compile(
-        rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)](?!\d)"
-        r"|\[(\d+)\]\s*=",
+        rf"(?:(?<!\w)(?:{words})[\s._]*#?|#)\s*(\d+)(?![\d.])\s*[:=.)]?|(?:^|[;,|])\W*(\d+)\s*[:=)](?!\d)",
         re.IGNORECASE,
     )
     given: list[tuple[int, int, str]] = []
@@ -43,7 +42,7 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int, counted: bool
             end = found[number + 1].start() if number + 1 < len(found) else len(line)
             name = line[match.end() : end].strip(_ENDS)
             if re.search(r"[^\W\d]", name):
-                given.append((index, int(match[1] or match[2] or match[3]), name))
+                given.append((index, int(match[1] or match[2]), name))
     for first, several in ((0, width), (1, width), *(((1, width - 1),) if counted else ())):
         numbered = [one for one in given if first <= one[1] < first + several]
         parts = [re.split(r"\s{2,}|\s*[\t;|]\s*", name, maxsplit=1) for _, _, name in numbered]

@@ -190,7 +190,7 @@ class RecordingMap(_Strict):
     )
     missing: Literal["refuse", "leave_out"] = Field(
         default="refuse",
-        description="rows without a value (up to 5 % of the file, or of a slower channel): refuse, or leave out",
+        description="rows without a value, up to 5 % of the file, and those of a slower channel: refuse, or leave out",
     )
     csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
     lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.importing.foreign_columns import is_slower
 from hil.importing.held_samples import kept_rows, lost_samples, slower
+from hil.importing.slow_columns import rows_per_value
 from hil.importing.slow_gaps import late_stamps, moving_little, with_gaps_filled
 from hil.importing.spikes import lone_values
 from hil.importing.stamp_columns import counted_on, range_of
@@ -56,14 +56,15 @@ def complete_rows(
     rows = distinct.rows[good[distinct.rows]]
     if not good.all():
         lacking = [name for name, values in columns.items() if not np.isfinite(values).all()]
-        slow = [name for name in lacking if is_slower(columns[name])]
+        slow = [name for name in lacking if rows_per_value(columns[name])]
+        taken = np.logical_and.reduce([np.isfinite(columns[name]) for name in slow] or [np.ones_like(good)])
         if slow:
             notes.append(
-                f"rates: {', '.join(slow)}: of a slower rate than the rows; of {good.size} rows those are taken in "
-                "which all have a value"
+                f"rates: {', '.join(slow)}: slower than the rows; {rows.size} of {good.size} rows have all values, and "
+                "are taken"
             )
-        if others := [name for name in lacking if name not in slow]:
-            bad = ~np.logical_and.reduce([np.isfinite(columns[name]) for name in others])
+        if others := [name for name in lacking if not np.isfinite(columns[name][taken]).all()]:
+            bad = taken & ~good
             first = int(np.argmax(bad)) + 1
             notes.append(
                 f"missing: {np.sum(bad)} rows have no value of {', '.join(others)} (first row {first} of the numbers) "

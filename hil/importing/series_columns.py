@@ -106,16 +106,24 @@ def _forwards(stamps: Sequence[float], groups: Sequence[tuple[str, ...]], least:
 def _needed(stamps: Sequence[float], groups: Sequence[tuple[str, ...]], more: Sequence[tuple[str, ...]]) -> bool:
     """True if stamps go forwards in more steps within the channels `more` than within `groups`, or begin anew less."""
     better = _forwards(stamps, more, 0.0) > _forwards(stamps, groups, 0.0) + _MORE
-    return better or _begins(stamps, more) < _begins(stamps, groups)
+    if better:
+        return True
+    times = dict[tuple[str, ...], list[float]]()
+    for stamp, group in zip(stamps, more, strict=True):
+        times.setdefault(group, []).append(stamp)
+    spans = [max(of) - min(of) for of in times.values()]
+    # all of one time: a state that was another one for a while tells no channels apart
+    return min(spans) > _MOSTLY * max(spans) and _begins(stamps, more) < _begins(stamps, groups)
 
 
 def _begins(stamps: Sequence[float], groups: Sequence[tuple[str, ...]]) -> int:
-    """Steps within a channel that go back by most of the time of all stamps: another series begins there."""
-    last, begins = dict[tuple[str, ...], float](), 0
+    """Steps within a channel against its direction by most of the time of all stamps: another series begins there."""
+    last, steps = dict[tuple[str, ...], float](), list[float]()
     for stamp, group in zip(stamps, groups, strict=True):
-        begins += last.get(group, stamp) - stamp > _MOSTLY * (max(stamps) - min(stamps))
+        steps.append(stamp - last.get(group, stamp))
         last[group] = stamp
-    return begins
+    way = 1.0 if sum(step > 0.0 for step in steps) >= sum(step < 0.0 for step in steps) else -1.0
+    return sum(way * step < -_MOSTLY * (max(stamps) - min(stamps)) for step in steps)
 
 
 def _differs(column: Sequence[str], groups: Sequence[tuple[str, ...]]) -> bool:

@@ -202,6 +202,35 @@ def test_datasets_with_numbers_for_names_have_those_of_an_attribute(tmp_path: Pa
     np.testing.assert_allclose(found["torque_n_m"], TORQUE, atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("factor", "says"), [(0.0, "the factor 0"), (np.nan, "the factor nan"), ("fast", "the factor nan")]
+)
+def test_a_factor_of_whole_numbers_that_is_none_is_refused(tmp_path: Path, factor: float | str, says: str) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["sample_rate_Hz"] = 1000.0
+        file.create_dataset("angle_rad", data=ANGLE)
+        torque = file.create_dataset("torque", data=np.round(TORQUE / 1e-4).astype(np.int32))
+        torque.attrs.update({"Unit": "Nm", "FACTOR": factor})
+    with pytest.raises(InputError, match=f"/torque: given {says}"):
+        imported(path)
+
+
+@pytest.mark.parametrize("factor", [b"1e-4", "1e-4", np.array([1e-4])])
+def test_a_factor_may_be_a_text_and_the_unit_stand_in_the_name(tmp_path: Path, factor: object) -> None:
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["sample_rate_Hz"] = 1000.0
+        file.create_dataset("q", data=ANGLE).attrs.update({"unit": "rad", "description": "angle of the motor"})
+        torque = file.create_dataset("P2", data=np.round(TORQUE / 1e-4).astype(np.int32))
+        torque.attrs.update({"Name": "torque_Nm", "Factor": factor, "label": h5py.Empty("f")})
+    found = imported(path)
+    assert found.metadata["channels"]["motor_position_rad"]["column"] == "q"
+    np.testing.assert_allclose(found["torque_n_m"], TORQUE, atol=1e-4)
+
+
 def test_an_attribute_that_groups_give_with_different_values_is_none(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"

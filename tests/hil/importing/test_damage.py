@@ -17,7 +17,6 @@ from damaged_files import (
     Make,
     content,
     cut,
-    every_fourth,
     field,
     in_rows,
     shuffled,
@@ -68,6 +67,11 @@ REFUSED: dict[str, tuple[str, Make, str]] = {
     ),
     "the torque ends half way": ("csv", table(**in_rows("torque", slice(HALF, None), np.nan)), "never after"),
     "the position starts half way": ("csv", table(**in_rows("angle", slice(0, HALF), np.nan)), "no number in 50"),
+    "a channel of another rate that ends early": (
+        "csv",
+        table(torque=np.where(np.arange(len(AXIS["t"])) % 4 < 2 * (AXIS["t"] < 1.0) - 1, AXIS["torque"], np.nan)),
+        "export one rate",
+    ),
     "a placeholder of -9999": ("csv", table(**in_rows("angle", slice(800, 801), -9999.0)), "spike or a placeholder"),
     "a spike in the set-point": ("csv", table(**in_rows("x_set", slice(800, 801), 1e6)), "spike or a placeholder"),
     "a position that jumps": ("csv", table(**in_rows("angle", slice(HALF, None), lambda v: v + 200.0)), "jumps"),
@@ -236,14 +240,3 @@ def test_an_odd_file_is_imported_and_the_oddity_named(tmp_path: Path, case: str)
     assert any(says in note for note in notes) if says else notes == []
     import_(path, None, tmp_path / "out.parquet", None, None)
     assert len(read_recording(tmp_path / "out.parquet")) > 0.9 * len(AXIS["t"])
-
-
-@pytest.mark.parametrize("name", ["torque_Nm", "motor_angle_rad"])
-def test_of_two_rates_the_slower_is_taken(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "log.csv"
-    text(every_fourth(name))(path)
-    assert f"rates: {name}: of a slower rate" in "".join(draft_map(path).unsure)
-    import_(path, None, tmp_path / "out.parquet", None, None)
-    recording = read_recording(tmp_path / "out.parquet")
-    assert recording.period_s == pytest.approx(4.0 * (AXIS["t"][1] - AXIS["t"][0]))
-    np.testing.assert_allclose(recording["torque_n_m"], AXIS["torque"][::4][: len(recording)], atol=1e-3)

@@ -88,6 +88,24 @@ TABLES = {
             for k in range(T.size)
         ),
     ],
+    "the same, newest first": [
+        "time,value,field,axis",
+        *(
+            f"{T[k]:.4f},{values[k]:.6f},{name},{axis}"
+            for axis, factor in (("A2", 0.3), ("A1", 1.0))
+            for name, values in (("torque_Nm", factor * TORQUE), ("angle_deg", factor * DEG))
+            for k in range(T.size - 1, -1, -1)
+        ),
+    ],
+    "a part of another state before": [
+        "time,value,field,state",
+        *(
+            f"{T[k]:.4f},{values[k]:.6f},{name},{state}"
+            for state, count in (("stopped", 4), ("running", T.size))
+            for name, values in (("angle_deg", DEG), ("torque_Nm", TORQUE))
+            for k in range(T.size - count, T.size)
+        ),
+    ],
     "numbers of rows, texts and bad values": [
         '"id","timestamp","tag","value","quality"',
         *(

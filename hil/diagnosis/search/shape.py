@@ -63,7 +63,25 @@ def log_chance_of_shape(found: Hypothesis, without: Fit, fitted: bool = True) ->
     By the number of values that were searched, see `_searched`. 0 where nothing tells, for less than the least energy
     that counts, and for a `fitted` shape that leaves more at its own size: of the size c the term
     has 1, and removes (2 c - 1) / c^2 of what the shape removes. Others are simulated with the steps of a search.
+    A term that may have further harmonics is asked without them, too: none need be there.
     """
+    added = _added(found, without)
+    plain = [_without_harmonics(found, added[-1])] if added else []
+    return min(_log_chance(one, without, fitted) for one in (found, *plain) if one is not None)
+
+
+def _without_harmonics(found: Hypothesis, term: Term) -> Hypothesis | None:
+    """The hypothesis with the values that a term need not have at their defaults; None if it has none."""
+    parameters = BY_ID[term.effect].parameters
+    values = tuple(v if p.default is None else p.default for p, v in zip(parameters, term.values, strict=True))
+    index = next((place for place, one in enumerate(found.terms) if one.key == term.key), None)
+    return (
+        None if values == tuple(term.values) or index is None else found.replaced(index, replace(term, values=values))
+    )
+
+
+def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
+    """The same of one form of a term."""
     fast = not fitted
     asked, best = _asked(without, fast), 0.0
     if asked is None:
@@ -205,10 +223,15 @@ def _joined(parts: Sequence[ResidualSeries], rows: Sequence[NDArray[np.bool_]]) 
 def _searched(found: Hypothesis) -> float:
     """Logarithm, over that of the independent rows, of the number of values in which the terms were searched.
 
-    A half for each parameter beside a strength (Schwarz 1978), one for the edge of a window, a line or a period, of
-    which as many are told apart as there are rows (Y.-C. Yao, Statistics and Probability Letters 6 (1988) 181).
+    A half for each parameter beside a strength and not at its default (Schwarz 1978), one for the edge of a window, a
+    line or a period, of which as many are told apart as there are rows (Y.-C. Yao, Statistics and Probability Letters 6
+    (1988) 181).
     """
-    roles = [one.role for one in found.coordinates if one.parameter is not None]
+    roles = [
+        one.role
+        for one, value in zip(found.coordinates, found.values, strict=True)
+        if one.parameter is not None and value != one.parameter.default
+    ]
     return sum(1.0 if role in _MANY else 0.5 for role in roles if role is not Role.STRENGTH)
 
 

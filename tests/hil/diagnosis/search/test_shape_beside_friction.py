@@ -12,10 +12,12 @@ from scipy.stats import norm
 
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.search.shape import _searched, _without_harmonics
 from hil.diagnosis.verdict.cross_validation import _by_torque
 from hil.diagnosis.verdict.findings import _sure
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
+from hil.identification.hypothesis import Hypothesis
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
 from hil.identification.torque_left import (
@@ -98,3 +100,15 @@ def test_the_torque_of_a_slow_end_is_missed_as_a_share_of_that_of_all_motion(wit
     missed = torque_missed(wrong, part)
     assert missed is not None
     assert missed * every == pytest.approx((left_by_twin(wrong.hypothesis, part, plain, own) or 0.0) * own)
+
+
+def test_a_lead_error_is_asked_without_the_harmonics_that_it_need_not_have() -> None:
+    """Else it loses to one wave of another cause by the values that were searched for them."""
+    found = Hypothesis(KNOWN, (Term("periodic_lead_error", 0, (1e-6, 0.7, 2e-7, 0.3, 1e-7, 0.1)),))
+    plain = _without_harmonics(found, found.terms[0])
+    assert plain is not None
+    assert plain.terms[0].values == (1e-6, 0.7, 0.0, 0.0, 0.0, 0.0)
+    one_wave = Hypothesis(KNOWN, (Term("encoder_eccentricity", 0, (1e-4, 0.7)),))
+    assert _searched(plain) == _searched(one_wave) < _searched(found)
+    assert _without_harmonics(plain, plain.terms[0]) is None
+    assert _without_harmonics(one_wave, one_wave.terms[0]) is None

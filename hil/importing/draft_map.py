@@ -29,6 +29,8 @@ from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.unit_choice import are_counts
 from hil.importing.wraps import unwrapped, wrap_range
 
+_TURNS = {360.0: "deg", 2.0 * np.pi: "rad"}  # unit of an angle by the range after which it starts again
+
 
 @bounded
 @np.errstate(invalid="ignore", over="ignore")  # an infinity is refused with its row, after sums and differences
@@ -58,6 +60,9 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
     columns = {name: scaled(table, name) for name in table.columns if name not in clock.columns}
     may_wrap = [name for name in columns if labels[name].quantity in (Quantity.POSITION, Quantity.UNKNOWN)]
     wraps = {name: size for name in may_wrap if (size := wrap_range(columns[name])) is not None}
+    unknown = [name for name in wraps if not (labels[name].unit or labels[name].odd_unit or are_counts(columns[name]))]
+    turns = {name: _TURNS[wraps[name]] for name in unknown if wraps[name] in _TURNS}
+    labels |= {name: replace(labels[name], quantity=Quantity.POSITION, unit=unit) for name, unit in turns.items()}
     columns |= {name: unwrapped(columns[name], size) for name, size in wraps.items()}
     filled = {n: filled_in(values, clock.time_s) for n, values in columns.items() if np.isfinite(values).any()}
     named = [name for name in filled if labels[name].quantity is Quantity.POSITION]
@@ -108,7 +113,11 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
                 for note in jump_notes(name, kept[name][measured_rows], kept_s[measured_rows])
             ),
             *(note for name in measured for note in limit_notes(name, kept[name])),
-            *(f"{name}: wraps at {wraps[name]:g}; it is unwrapped" for name in used if name in wraps),
+            *(
+                f"{name}: wraps at {wraps[name]:g}; it is unwrapped{f', and in {turns[name]}' if name in turns else ''}"
+                for name in used
+                if name in wraps
+            ),
             *(
                 f"{name}: is written only where it changes; an empty cell holds its last value"
                 for name in used

@@ -34,6 +34,7 @@ PERIODS = {
     "Période (ms);3,2\n": 312.5,
     "Periodo: 16 ms\n": 62.5,
     "rate = 160 Hz\n": 160.0,
+    "Task;PrimaryTask;2000;us\n": 500.0,
     "fs: 1,25 kHz\n": 1250.0,
     "Zykluszeit [ms];0,8\n": 1250.0,
     '"V 1.3","dt=20ms"\n': 50.0,

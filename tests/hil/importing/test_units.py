@@ -1,8 +1,13 @@
 """Spellings of units of foreign files."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
+from foreign_axis import axis, write
 
 from hil.importing.column_names import label
+from hil.importing.draft_map import draft_map
 from hil.importing.lexicon import Quantity
 from hil.importing.units import QUANTITY_OF_UNIT, split_unit, unit_named
 from hil.quantities import si_factor
@@ -75,3 +80,17 @@ def test_a_unit_that_is_the_name_or_stands_before_its_last_word(name: str, unit:
 @pytest.mark.parametrize(("name", "unit"), [("phi_M", None), ("phi_m", "m"), ("POS_M", "m")])
 def test_a_capital_is_no_metre_where_the_name_has_small_letters(name: str, unit: str | None) -> None:
     assert split_unit(name)[1] == unit
+
+
+@pytest.mark.parametrize(("turn", "unit"), [(360.0, "deg"), (2.0 * np.pi, "rad")])
+def test_an_angle_without_a_unit_that_starts_again_after_a_turn_tells_it(
+    tmp_path: Path, turn: float, unit: str
+) -> None:
+    columns = axis()
+    angle = np.mod(columns["angle"] / (2.0 * np.pi) * turn, turn)
+    draft = draft_map(
+        write(tmp_path / "log.csv", {"time_s": columns["t"], "ActPos": angle, "torque_Nm": columns["torque"]})
+    )
+    (position,) = (one.entry for one in draft.channels if one.channel == "motor_position_rad")
+    assert position["unit"] == unit
+    assert any(f"it is unwrapped, and in {unit}" in note for note in draft.unsure)

@@ -31,6 +31,7 @@ from hil.importing.draft_map import draft_map
 from hil.importing.joined_logs import join_logs
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import COUNT_AS, take_own_units
+from hil.importing.readme import Told
 from hil.importing.still_open import still_open
 from hil.recording.recording import Recording, read_recording
 
@@ -112,6 +113,7 @@ def explain(
     *,
     rate_hz: float | None = None,
     axis: str | None = None,
+    readme: str | Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
     look: Callable[[list[str]], None] = lambda lines: None,
     first: Callable[[Basis], None] = lambda basis: None,
@@ -123,9 +125,10 @@ def explain(
     sources: a file or several, any that `hil import` reads; where one has the position and another the torque, they are
     joined by their stamps. folder: None takes explained-NAME of the first file; maps and bench that are there are used,
     so correct them and call again. rate_hz: rows per second of files without time stamps. axis: that of files with
-    several. progress: called with each step. look: called with what the recordings show without a twin, as soon as they
-    are read. first: called with what is known before the search. answer: called with the diagnosis before its page is
-    drawn. budget_s: processor time of the search [s].
+    several. readme: a text of their owner, which tells what they do not: lead, counts, torque constant. progress:
+    called with each step. look: called with what the recordings show without a twin, as soon as they are read. first:
+    called with what is known before the search. answer: called with the diagnosis before its page is drawn. budget_s:
+    processor time of the search [s].
 
     Returns `diagnosis`, `bench`, `recordings`, `assumed`, `folder` and `report`. Raises InputError for a file that
     cannot be read, with the lines of its map that the user must complete, and for recordings that cannot be diagnosed.
@@ -134,15 +137,16 @@ def explain(
     if not paths:
         raise InputError("sources: given none, allowed one or more; give the recordings to explain")
     folder = Path(f"explained-{paths[0].stem}") if folder is None else Path(folder)
+    told = Told(rate_hz, axis, None if readme is None else Path(readme))
     try:
-        read, assumed = _recordings(paths, folder, rate_hz, axis, progress)
+        read, assumed = _recordings(paths, folder, told, progress)
     except PartOfAxis:
         if len(paths) == 1:
             raise
         joined = folder / f"{paths[0].stem}-joined.csv"
-        told = join_logs(paths, joined, any(_is_whole(one, rate_hz, axis) for one in paths))
-        read, assumed = _recordings([joined], folder, None, axis, progress)
-        assumed = [told, *assumed]
+        how = join_logs(paths, joined, any(_is_whole(one, told) for one in paths))
+        read, assumed = _recordings([joined], folder, told._replace(rate_hz=None), progress)
+        assumed = [how, *assumed]
     look(first_look(read))
     progress("taking the bench, or drafting it")
     bench, draft, notes = _bench(read, folder / BENCH)
@@ -162,7 +166,7 @@ def explain(
 
 
 def _recordings(
-    paths: Sequence[Path], folder: Path, rate_hz: float | None, axis: str | None, progress: Callable[[str], None]
+    paths: Sequence[Path], folder: Path, told: Told, progress: Callable[[str], None]
 ) -> tuple[list[Recording], list[str]]:
     """The recordings of files, and what was assumed. One map is for all files whose drafts say the same."""
     read, assumed = list[Recording](), list[str]()
@@ -170,17 +174,17 @@ def _recordings(
     for source in paths:
         progress(f"reading {source.name}")
         path = _map_path(source, paths, folder)
-        shared = not is_file(path) and is_file(first) and _alike(source, paths[0], rate_hz, axis)
-        recording, notes = _recording(source, first if shared else path, rate_hz, axis)
+        shared = not is_file(path) and is_file(first) and _alike(source, paths[0], told)
+        recording, notes = _recording(source, first if shared else path, told)
         read.append(recording)
         assumed += notes
     return read, list(dict.fromkeys(assumed))
 
 
-def _alike(source: Path, first: Path, rate_hz: float | None, axis: str | None) -> bool:
+def _alike(source: Path, first: Path, told: Told) -> bool:
     """True if the drafts of the maps of two files say the same, so that one map is right for both."""
     with suppress(InputError):
-        drafts = [yaml.safe_load(map_text(draft_map(one, rate_hz, axis))) for one in (source, first)]
+        drafts = [yaml.safe_load(map_text(draft_map(one, *told))) for one in (source, first)]
         return _same(drafts[0] | {"about": ""}, drafts[1] | {"about": ""})
     return False
 
@@ -197,10 +201,10 @@ def _same(one: object, other: object) -> bool:
     return one == other
 
 
-def _is_whole(source: Path, rate_hz: float | None, axis: str | None) -> bool:
+def _is_whole(source: Path, told: Told) -> bool:
     """True if a file has what a recording needs, by itself."""
     try:
-        return all(one.key != "column" for one in draft_map(source, rate_hz, axis).asked)
+        return all(one.key != "column" for one in draft_map(source, *told).asked)
     except PartOfAxis:
         return False
 
@@ -214,14 +218,14 @@ def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:
     return folder / f"{name}-map.yaml"
 
 
-def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None) -> tuple[Recording, list[str]]:
+def _recording(source: Path, path: Path, given: Told) -> tuple[Recording, list[str]]:
     """A recording of this project as it is, any other file by its map at `path`; and what was assumed."""
     if not is_file(path):
         if (exported := read_exported(source)) is not None:
             return exported, []
         with suppress(InputError):  # a foreign file
             return read_recording(source), []
-    options = [*(["--rate", f"{rate_hz:g}"] if rate_hz else []), *(["--axis", axis] if axis else [])]
+    options = given.options
     mark = f"{_DRAFTED_WITH}{shlex.join(options)}\n"
     command = shlex.join(["hil", "explain", str(source), "--out", str(path.parent), *options])
     notes = list[str]()
@@ -230,7 +234,7 @@ def _recording(source: Path, path: Path, rate_hz: float | None, axis: str | None
         notes = [f"{path}: used as it is for {source.name}", *_still_open(source, path, text)]
     else:
         try:
-            draft = draft_map(source, rate_hz, axis)
+            draft = draft_map(source, *given)
         except RateNeeded as error:
             raise RateNeeded(error.problem, command) from None
         take_own_units(draft)
@@ -257,8 +261,7 @@ def _still_open(source: Path, path: Path, text: str) -> list[str]:
     """Doubts of the draft of a map that its user has not settled; none where it cannot be drafted again."""
     with suppress(InputError, ValueError, yaml.YAMLError):  # of what a user wrote
         words = shlex.split("".join(text.partition(_DRAFTED_WITH)[2].splitlines()[:1]))
-        options = dict(zip(words[::2], words[1::2], strict=True))
-        draft = draft_map(source, float(options["--rate"]) if "--rate" in options else None, options.get("--axis"))
+        draft = draft_map(source, *Told.of(dict(zip(words[::2], words[1::2], strict=True))))
         take_own_units(draft)
         return [f"{path}: {note}" for note in still_open(draft, text)]
     return []

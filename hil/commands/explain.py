@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.options import AxisInNames, Rate
+from hil.commands.options import AxisInNames, Rate, Readme
 from hil.report.console import err, out, print_look, progress, table
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def explain(
     ] = None,
     rate_hz: Rate = None,
     axis: AxisInNames = None,
+    readme: Readme = None,
     show: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
     budget_s: Annotated[
         float | None,
@@ -66,6 +67,7 @@ def explain(
             folder,
             rate_hz=rate_hz,
             axis=axis,
+            readme=readme,
             progress=tell,
             look=look,
             first=_first_answer,

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hil.commands.options import AxisInNames, Rate
+from hil.commands.options import AxisInNames, Rate, Readme
 from hil.report.console import err, out
 
 if TYPE_CHECKING:
+    from hil.importing.readme import Told
     from hil.recording.recording import Recording
 
 
@@ -39,6 +40,7 @@ def import_(
     ] = None,
     rate_hz: Rate = None,
     axis: AxisInNames = None,
+    readme: Readme = None,
     bench: Annotated[
         str | None,
         typer.Option(
@@ -50,22 +52,28 @@ def import_(
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
     from hil.errors import InputError
     from hil.importing.by_map import import_recording
+    from hil.importing.readme import Told
     from hil.recording.recording import CLOCK_NOTES, write_parquet
 
     target = target or Path(f"{source.stem}.parquet")
-    if map_file is None and rate_hz is None and axis is None:
+    told = Told(rate_hz, axis, readme)
+    if map_file is None and not told.options:
         known = _without_a_map(source, bench)
         if known is not None:
             write_parquet(known, target)
             out.print(f"{len(known)} rows, {known.period_s:g} s each\nRecording: {target}")
             return
     elif bench is not None:
-        raise InputError("import: given --bench and --map, --rate or --axis, allowed one of them; leave the others out")
+        raise InputError(
+            "import: given --bench and --map, --rate, --axis or --readme, allowed one; leave the others out"
+        )
     drafted = map_file is None
     if map_file is None:
-        map_file = str(_drafted(source, target, rate_hz, axis))
-    elif rate_hz is not None or axis is not None:
-        raise InputError("import: given --map and --rate or --axis, allowed only without a map; write it into the map")
+        map_file = str(_drafted(source, target, told))
+    elif told.options:
+        raise InputError(
+            f"import: given --map and {told.options[0]}, allowed only without a map; write it into the map"
+        )
     recording = import_recording(source, map_file)
     write_parquet(recording, target)
     out.print(f"{len(recording)} rows, {recording.metadata['clock']}")
@@ -97,7 +105,7 @@ def _without_a_map(source: Path, bench: str | None) -> Recording | None:
     return read_exported(source)
 
 
-def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None) -> Path:
+def _drafted(source: Path, target: Path, told: Told) -> Path:
     """Draft a map beside the recording to write; return its path. Raises InputError: the user must complete it."""
     from hil.errors import InputError, listed
     from hil.files.input_file import is_file
@@ -108,7 +116,7 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
     path = target.with_name(f"{target.stem}-map.yaml")
     if is_file(path):
         raise InputError(f"{path}: the map exists and is not overwritten; import with --map {path}, or remove it")
-    draft = draft_map(source, rate_hz, axis)
+    draft = draft_map(source, *told)
     text = map_text(draft)
     write_text(path, text)
     out.print(f"Map: {path}")
@@ -122,6 +130,6 @@ def _drafted(source: Path, target: Path, rate_hz: float | None, axis: str | None
         questions = [f"{path}:{line}: {question}" for line, question in asked_lines(text)]
         to = [] if target == Path(f"{source.stem}.parquet") else ["--out", str(target)]
         command = shlex.join(["hil", "import", str(source), "--map", str(path), *to])
-        told = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
-        raise InputError("\n".join([told, *questions]))
+        what = f"{source}: the file does not tell what follows; write it into the map, then: {command}"
+        raise InputError("\n".join([what, *questions]))
     return path

@@ -25,6 +25,14 @@ Rate = Annotated[
     float | None,
     typer.Option("--rate", min=0.1, help="Rows per second, for a file without time stamps.", show_default=False),
 ]
+Readme = Annotated[
+    Path | None,
+    typer.Option(
+        "--readme",
+        help="Text of the owner that tells what the file does not: lead, counts, torque constant, units.",
+        show_default=False,
+    ),
+]
 AxisInNames = Annotated[
     str | None,
     typer.Option(

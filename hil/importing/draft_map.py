@@ -23,6 +23,7 @@ from hil.importing.map_file import ChannelSource
 from hil.importing.on_change import columns_on_change, held
 from hil.importing.one_rate import use_one_rate
 from hil.importing.questions import effort_unit, position_unit
+from hil.importing.readme import with_readme
 from hil.importing.roles import Roles, find_roles, may_be_asked
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
@@ -34,11 +35,14 @@ _TURNS = {360.0: "deg", 2.0 * np.pi: "rad"}  # unit of an angle by the range aft
 
 @bounded
 @np.errstate(invalid="ignore", over="ignore")  # an infinity is refused with its row, after sums and differences
-def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None = None) -> MapDraft:
+def draft_map(
+    path: str | Path, rate_hz: float | None = None, axis: str | None = None, readme: str | Path | None = None
+) -> MapDraft:
     """Draft the map of a foreign file: which column is which channel, in which unit, with which sign.
 
     path: any file that `hil import` reads. rate_hz: rows per second, of a file without time stamps. axis: number or
-    letter of the axis in the names of columns, of a file with several.
+    letter of the axis in the names of columns, of a file with several. readme: a text of the owner, which tells
+    what the file does not: lead, counts, torque constant, units of columns.
 
     Returns the draft: `asked` are keys that the file does not tell, `unsure` is what to check. `hil.save` it as YAML,
     complete it there, and read the file with `import_recording`. Raises InputError: a damaged file, no clock, no column
@@ -46,6 +50,7 @@ def draft_map(path: str | Path, rate_hz: float | None = None, axis: str | None =
     """
     path = Path(path)
     table = read_table(path)
+    table = table if readme is None else with_readme(table, Path(readme))
     given, labels = table.columns, labels_of(table)
     times = set(time_columns(table, labels))
     own = on_one_clock(table, labels)

@@ -1,0 +1,90 @@
+"""A text of the owner tells what a file does not: lead, counts, torque constant, units of columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import axis, write
+
+from hil.commands.import_ import import_
+from hil.errors import InputError
+from hil.explanation import explain
+from hil.importing.draft_map import draft_map
+from hil.importing.readme import Told
+from hil.recording.recording import read_recording
+
+AXIS = axis()
+COUNTS, CONSTANT = 4096, 0.25
+COLUMNS = {
+    "time_s": AXIS["t"],
+    "pos_inc": np.round(AXIS["angle"] / (2.0 * np.pi) * COUNTS),
+    "iq_A": AXIS["torque"] / CONSTANT,
+}
+TEXT = f"""Lifting axis of the test rig, belt removed.
+
+pos_inc   encoder of the motor, {COUNTS} increments per turn
+iq_A      current, measured
+torque constant {CONSTANT} Nm/A (data sheet)
+"""
+
+
+@pytest.fixture(params=["csv", "parquet", "mat", "json"])
+def source(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    return write(tmp_path / f"log.{request.param}", COLUMNS)
+
+
+@pytest.fixture
+def readme(tmp_path: Path) -> Path:
+    path = tmp_path / "README.txt"
+    path.write_text(TEXT)
+    return path
+
+
+def test_sizes_of_a_readme_are_those_of_the_file(source: Path, readme: Path, tmp_path: Path) -> None:
+    assert [one.key for one in draft_map(source).asked] == ["counts_per_rev", "torque_constant_n_m_a"]
+    assert not draft_map(source, readme=readme).asked
+    import_(source, None, tmp_path / "out.parquet", readme=readme)
+    recording = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(recording["motor_position_rad"], AXIS["angle"], atol=2.0 * np.pi / COUNTS)
+    np.testing.assert_allclose(recording["torque_n_m"], AXIS["torque"], atol=1e-6)
+
+
+def test_what_the_file_says_goes_first(readme: Path, tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", COLUMNS)
+    path.write_text("# torque constant 0.5 Nm/A\n" + path.read_text())
+    entries = {one.channel: one.entry for one in draft_map(path, readme=readme).channels}
+    assert entries["torque_n_m"]["torque_constant_n_m_a"] == 0.5
+    assert entries["motor_position_rad"]["counts_per_rev"] == COUNTS
+
+
+def test_units_of_columns_are_read(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.parquet", {"t": AXIS["t"], "phi": np.rad2deg(AXIS["angle"]), "M": AXIS["torque"]})
+    text = tmp_path / "notes.md"
+    text.write_text("t [s], phi angle of the motor [deg], M torque [Nm]\n", encoding="cp1252")
+    units = {one.channel: one.entry["unit"] for one in draft_map(path, readme=text).channels}
+    assert units == {"motor_position_rad": "deg", "torque_n_m": "N m"}
+
+
+def test_a_readme_that_is_not_there_is_refused(source: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no such file; give a text of the owner"):
+        draft_map(source, readme=tmp_path / "none.txt")
+
+
+def test_a_map_knows_the_readme_that_it_was_drafted_with(source: Path, readme: Path, tmp_path: Path) -> None:
+    first = explain(source, tmp_path / "explained", readme=readme)
+    (the_map,) = (tmp_path / "explained").glob("*-map.yaml")
+    assert the_map.read_text().splitlines()[-1] == f"# Drafted with: --readme {readme}"
+    again = explain(source, tmp_path / "explained", readme=readme)
+    assert not first.basis.unsized
+    assert not again.basis.unsized
+    with pytest.raises(InputError, match="was not drafted with --rate 500"):
+        explain(source, tmp_path / "explained", rate_hz=500.0)
+
+
+def test_options_tell_what_the_user_told() -> None:
+    told = Told(500.0, "2", Path("README.txt"))
+    words = told.options
+    assert Told.of(dict(zip(words[::2], words[1::2], strict=True))) == told
+    assert Told().options == []

@@ -130,7 +130,7 @@ class ChannelEntries:
             else:
                 draft.lead_m = ROTARY_LEAD_M
                 draft.lead_how = "an axis that turns: leave it. Of a screw, belt or rack write the travel per turn"
-                keys |= {} if counted or roles.table else self._gear(name)
+                keys |= {} if counted else self._gear(name)
         keys |= {"sign": -1} if self.motor_sign < 0 else {}
         self._add(channel, name, "steps of the motor" if self.labels[name].command else "the motor's encoder", keys)
         for other, channel, what in (
@@ -198,15 +198,15 @@ class ChannelEntries:
                     f"{name}: comes {1e3 * late_s:.3g} ms after {encoder}, a set-point comes before: its "
                     "stamps are late, or the drive leads it; the control law cannot be judged with it as it is"
                 )
-        keys |= {"scale": self.ratio} if self.ratio != 1.0 else {}
+        keys |= {"scale": self.ratio} if self.ratio != 1.0 and channel != "table_position_m" else {}
         same = abs(abs(factor) - 1.0) < SAME_COUNTS
         if unit == "counts" and self.unsized:  # its counts are told when those of the encoder are
             ratio = 1.0 if same else counts_ratio(abs(factor))
             given = f"write the same as for {encoder}" if same else f"write {ratio:.6g} times that of {encoder}"
             given += "; behind a gear times its ratio" if channel == "position_command_m" and same else ""
-            if channel == "table_position_m" and not same:
-                given = f"write those per revolution of the load; on the motor's shaft {given.removeprefix('write ')}"
-                given += "; of a linear scale write counts_per_m in its place, and lead_m above the line 'channels:'"
+            if channel == "table_position_m":
+                far = "" if same else "those per revolution of the load; on the motor's shaft "
+                given = f"write {far}{given[6:]}; of a linear scale counts_per_m, and lead_m above the line 'channels:'"
             keys |= {key: size * ratio for key, size in self.unsized.items()}
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
         elif unit == "counts" and channel == "table_position_m" and (count := self.positions.count_by_command(name)):

@@ -229,7 +229,9 @@ class RecordingMap(_Strict):
         for name, source in self.channels.items():
             if name not in CHANNELS or name == "time_s":
                 known = ", ".join(channel for channel in CHANNELS if channel != "time_s")
-                raise FieldError(("channels", name), f"is no channel, allowed {known}; correct the name")
+                turns = name.removesuffix("_rad") + "_m"
+                like = f"; of a load that turns {turns} with the unit rad or deg" if turns in CHANNELS else ""
+                raise FieldError(("channels", name), f"is no channel, allowed {known}{like}; correct the name")
             si = CHANNELS[name].unit
             if source.factor_to(si, lead_m) is None:
                 allowed = [*units_of(si, lead_m), *_CONSTANTS]

@@ -19,6 +19,7 @@ from hil.importing.row_counters import COUNTER, rises_evenly
 from hil.importing.two_encoders import follows_steps, motors_encoder, named_encoders
 from hil.importing.unnamed_columns import quantities_by_relations
 from hil.quantities import UNITS
+from hil.recording.quantum import count_of
 
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 _ALONE = "a set-point of the velocity; the control law is read from set-points of the position"
@@ -29,6 +30,7 @@ _NO_ROLE = {
     Quantity.UNKNOWN: "its name says nothing, and no relation to the motion is found",
 }
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
+_SINGLE = 2.5e-7  # of a number: rounding in single precision, both ways
 
 
 @dataclass
@@ -227,9 +229,12 @@ def _turns(name: str, positions: list[str], labels: dict[str, Label]) -> bool:
 
 
 def _copies(first: FloatArray, second: FloatArray) -> bool:
+    """True if two columns (n,) are the same numbers in two units, but for their rounding: a second sensor has noise."""
     factor = proportional(second, first).factor
+    steps = abs(factor) * (count_of(first) or 0.0) + (count_of(second) or 0.0)
+    rounding = max(2.0 * steps, _SINGLE * float(np.max(np.abs(second))))
     left = second - factor * first
-    return bool(factor != 0.0 and np.ptp(left) < SAME_COLUMN * np.ptp(second))
+    return bool(factor != 0.0 and np.ptp(left) < min(SAME_COLUMN * np.ptp(second), rounding))
 
 
 def _velocities(

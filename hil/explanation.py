@@ -31,7 +31,7 @@ from hil.importing.draft_map import draft_map
 from hil.importing.joined_logs import join_logs
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import COUNT_AS, take_own_units
-from hil.importing.readme import Told
+from hil.importing.readme import FileHints
 from hil.importing.still_open import still_open
 from hil.recording.recording import Recording, read_recording
 
@@ -137,7 +137,7 @@ def explain(
     if not paths:
         raise InputError("sources: given none, allowed one or more; give the recordings to explain")
     folder = Path(f"explained-{paths[0].stem}") if folder is None else Path(folder)
-    told = Told(rate_hz, axis, None if readme is None else Path(readme))
+    told = FileHints(rate_hz, axis, None if readme is None else Path(readme))
     try:
         read, assumed = _recordings(paths, folder, told, progress)
     except PartOfAxis:
@@ -166,7 +166,7 @@ def explain(
 
 
 def _recordings(
-    paths: Sequence[Path], folder: Path, told: Told, progress: Callable[[str], None]
+    paths: Sequence[Path], folder: Path, told: FileHints, progress: Callable[[str], None]
 ) -> tuple[list[Recording], list[str]]:
     """The recordings of files, and what was assumed. One map is for all files whose drafts say the same."""
     read, assumed = list[Recording](), list[str]()
@@ -181,7 +181,7 @@ def _recordings(
     return read, list(dict.fromkeys(assumed))
 
 
-def _alike(source: Path, first: Path, told: Told) -> bool:
+def _alike(source: Path, first: Path, told: FileHints) -> bool:
     """True if the drafts of the maps of two files say the same, so that one map is right for both."""
     with suppress(InputError):
         drafts = [yaml.safe_load(map_text(draft_map(one, *told))) for one in (source, first)]
@@ -201,7 +201,7 @@ def _same(one: object, other: object) -> bool:
     return one == other
 
 
-def _is_whole(source: Path, told: Told) -> bool:
+def _is_whole(source: Path, told: FileHints) -> bool:
     """True if a file has what a recording needs, by itself."""
     try:
         return all(one.key != "column" for one in draft_map(source, *told).asked)
@@ -218,7 +218,7 @@ def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:
     return folder / f"{name}-map.yaml"
 
 
-def _recording(source: Path, path: Path, given: Told) -> tuple[Recording, list[str]]:
+def _recording(source: Path, path: Path, given: FileHints) -> tuple[Recording, list[str]]:
     """A recording of this project as it is, any other file by its map at `path`; and what was assumed."""
     if not is_file(path):
         if (exported := read_exported(source)) is not None:
@@ -261,7 +261,7 @@ def _still_open(source: Path, path: Path, text: str) -> list[str]:
     """Doubts of the draft of a map that its user has not settled; none where it cannot be drafted again."""
     with suppress(InputError, ValueError, yaml.YAMLError):  # of what a user wrote
         words = shlex.split("".join(text.partition(_DRAFTED_WITH)[2].splitlines()[:1]))
-        draft = draft_map(source, *Told.of(dict(zip(words[::2], words[1::2], strict=True))))
+        draft = draft_map(source, *FileHints.of(dict(zip(words[::2], words[1::2], strict=True))))
         take_own_units(draft)
         return [f"{path}: {note}" for note in still_open(draft, text)]
     return []

@@ -12,7 +12,7 @@ from hil.commands.options import AxisInNames, Rate, Readme
 from hil.report.console import err, out
 
 if TYPE_CHECKING:
-    from hil.importing.readme import Told
+    from hil.importing.readme import FileHints
     from hil.recording.recording import Recording
 
 
@@ -52,11 +52,11 @@ def import_(
     """Convert a foreign recording to Parquet by a map of its columns, units and signs, or draft this map."""
     from hil.errors import InputError
     from hil.importing.by_map import import_recording
-    from hil.importing.readme import Told
+    from hil.importing.readme import FileHints
     from hil.recording.recording import CLOCK_NOTES, write_parquet
 
     target = target or Path(f"{source.stem}.parquet")
-    told = Told(rate_hz, axis, readme)
+    told = FileHints(rate_hz, axis, readme)
     if map_file is None and not told.options:
         known = _without_a_map(source, bench)
         if known is not None:
@@ -105,7 +105,7 @@ def _without_a_map(source: Path, bench: str | None) -> Recording | None:
     return read_exported(source)
 
 
-def _drafted(source: Path, target: Path, told: Told) -> Path:
+def _drafted(source: Path, target: Path, told: FileHints) -> Path:
     """Draft a map beside the recording to write; return its path. Raises InputError: the user must complete it."""
     from hil.errors import InputError, listed
     from hil.files.input_file import is_file

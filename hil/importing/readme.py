@@ -14,7 +14,7 @@ from hil.importing.unit_lines import described
 _LONGEST = 1_000_000  # bytes
 
 
-class Told(NamedTuple):
+class FileHints(NamedTuple):
     """Rows per second of a file without time stamps, the axis of one with several, and a text of its owner."""
 
     rate_hz: float | None = None
@@ -22,7 +22,7 @@ class Told(NamedTuple):
     readme: Path | None = None
 
     @classmethod
-    def of(cls, options: Mapping[str, str]) -> "Told":
+    def of(cls, options: Mapping[str, str]) -> "FileHints":
         """The same of options of the command line."""
         rate, readme = options.get("--rate"), options.get("--readme")
         return cls(float(rate) if rate else None, options.get("--axis"), Path(readme) if readme else None)

@@ -12,7 +12,7 @@ from hil.commands.import_ import import_
 from hil.errors import InputError
 from hil.explanation import explain
 from hil.importing.draft_map import draft_map
-from hil.importing.readme import Told
+from hil.importing.readme import FileHints
 from hil.recording.recording import read_recording
 
 AXIS = axis()
@@ -84,7 +84,7 @@ def test_a_map_knows_the_readme_that_it_was_drafted_with(source: Path, readme: P
 
 
 def test_options_tell_what_the_user_told() -> None:
-    told = Told(500.0, "2", Path("README.txt"))
+    told = FileHints(500.0, "2", Path("README.txt"))
     words = told.options
-    assert Told.of(dict(zip(words[::2], words[1::2], strict=True))) == told
-    assert Told().options == []
+    assert FileHints.of(dict(zip(words[::2], words[1::2], strict=True))) == told
+    assert FileHints().options == []

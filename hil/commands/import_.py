@@ -65,7 +65,7 @@ def import_(
             return
     elif bench is not None:
         raise InputError(
-            "import: given --bench and --map, --rate, --axis or --readme, allowed one; leave the others out"
+            "import: given --bench and --map, --rate, --axis or --readme, allowed one of them; leave the others out"
         )
     drafted = map_file is None
     if map_file is None:

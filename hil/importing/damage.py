@@ -30,9 +30,9 @@ TOLD = 0.8  # share of the torque that the motion of each half must explain befo
 
 
 def refuse_missing(table: ForeignTable, columns: dict[str, FloatArray]) -> None:
-    """Refuse a column (n,) with text among its numbers, infinity, or many missing values, if it is not slower.
+    """Refuse a column (n,) with text among its numbers, infinity, or many missing values. Raises InputError.
 
-    Raises InputError.
+    A column of a slower rate (`rows_per_value`) has no missing values.
     """
     for name, values in columns.items():
         if name in table.texts:

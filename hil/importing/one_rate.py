@@ -14,7 +14,7 @@ _SAME = 0.95  # share of the rows of motion and effort in which another column h
 
 
 def use_one_rate(path: Path, columns: Mapping[str, FloatArray], roles: Roles) -> None:
-    """Leave columns (n,) out of the roles that are slower than motion and effort; these are needed.
+    """Leave set-points and second encoders (n,) out of the roles that are slower than motion and effort.
 
     Raises InputError: motion and effort have no values in the same rows.
     """

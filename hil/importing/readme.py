@@ -1,4 +1,4 @@
-"""What a user tells beside a file: its rate, its axis, and a text of its owner, a README or a data sheet."""
+"""What the user of a file adds to it: its sampling rate, its axis, and a README or data sheet with sizes and units."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,11 +11,11 @@ from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import header_values
 from hil.importing.unit_lines import described
 
-_LONGEST = 1_000_000  # bytes
+_LONGEST = 1_000_000  # bytes: no README is as long
 
 
 class FileHints(NamedTuple):
-    """Rows per second of a file without time stamps, the axis of one with several, and a text of its owner."""
+    """Sampling rate of a file without time stamps, axis of a file with several, README of the machine."""
 
     rate_hz: float | None = None
     axis: str | None = None
@@ -23,22 +23,22 @@ class FileHints(NamedTuple):
 
     @classmethod
     def of(cls, options: Mapping[str, str]) -> "FileHints":
-        """The same of options of the command line."""
+        """The hints in options of the command line, by name."""
         rate, readme = options.get("--rate"), options.get("--readme")
         return cls(float(rate) if rate else None, options.get("--axis"), Path(readme) if readme else None)
 
     @property
     def options(self) -> list[str]:
-        """Options of the command line that tell it."""
+        """The hints as options of the command line."""
         rate = f"{self.rate_hz:g}" if self.rate_hz else None
         told = (("--rate", rate), ("--axis", self.axis), ("--readme", self.readme))
         return [text for name, value in told if value for text in (name, str(value))]
 
 
 def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
-    """The table with constants, and units and words of its columns, by a text; what the file says goes first.
+    """Add the constants, and the units and words of columns, that a README tells; what the file says goes first.
 
-    Raises InputError: no such file, or no text.
+    Raises InputError: no such file, or one of more than 1 MB.
     """
     check_file(readme, "a text of the owner", _LONGEST)
     raw = readme.read_bytes().splitlines()

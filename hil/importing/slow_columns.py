@@ -5,7 +5,7 @@ import numpy as np
 from hil.arrays import FloatArray
 
 _FEW = 10  # values, at most, that tell no rate
-_EVEN = 0.95  # share of the steps that are the usual one to a row: others are lost values
+_EVEN = 0.95  # share of the steps within a row of the usual one: others are lost values
 _COVERED = 0.9  # share of the rows that values at the usual step cover: less ends early
 
 

@@ -75,13 +75,13 @@ def _without_harmonics(found: Hypothesis, term: Term) -> Hypothesis | None:
     parameters = BY_ID[term.effect].parameters
     values = tuple(v if p.default is None else p.default for p, v in zip(parameters, term.values, strict=True))
     index = next((place for place, one in enumerate(found.terms) if one.key == term.key), None)
-    return (
-        None if values == tuple(term.values) or index is None else found.replaced(index, replace(term, values=values))
-    )
+    if index is None or values == tuple(term.values):
+        return None
+    return found.replaced(index, replace(term, values=values))
 
 
 def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
-    """The same of one form of a term."""
+    """`log_chance_of_shape` of one form of a term."""
     fast = not fitted
     asked, best = _asked(without, fast), 0.0
     if asked is None:

@@ -184,7 +184,7 @@ def test_counts_with_a_scale_and_their_number_per_turn_beside_a_dataset(tmp_path
 
 
 def test_datasets_with_numbers_for_names_have_those_of_an_attribute(tmp_path: Path) -> None:
-    """As a rapid prototyping system writes them: /Measurement/Y3 with Path, Unit and Factor."""
+    """dSPACE writes a dataset /Measurement/Y3, and its name into the attribute Path."""
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:

@@ -1,4 +1,4 @@
-"""Of several rates in one file that of motion and torque is taken."""
+"""A file with channels of several sampling rates is read at the rate of motion and torque."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the torque tells of an effect below the noise of a row, also where the twin has too much friction."""
+"""The torque shows an effect that is below the noise of one row, even if the twin has too much friction."""
 
 from __future__ import annotations
 

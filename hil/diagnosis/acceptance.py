@@ -155,9 +155,10 @@ def _torque(of: Addition | Ablation, c: Criteria) -> Answer | None:
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
-    """Little is left beside noise; with open inputs, or at the floor, most is explained."""
+    """Little is left beside noise; with open inputs, or at the floor, most is explained; below the noise is nothing."""
     stands = (
-        (of.left < 1.0 and names_stand(of.told, of.above, c))
+        of.below_noise
+        or (of.left < 1.0 and names_stand(of.told, of.above, c))
         or (of.open_inputs and of.left <= c.most_left)
         or (of.at_floor and (of.left <= c.most_left or of.above <= c.floor))
     )

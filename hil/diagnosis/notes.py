@@ -60,7 +60,8 @@ def _on_figures(judged: Judged, table: dict[str, ChannelFit]) -> list[str]:
 def _on_terms(judged: Judged, forms: Container[int]) -> list[str]:
     """Notes on terms that were dropped or not validated, and on those that explain too little."""
     proof, searched = judged.tested.proof, judged.tested.searched
-    notes = [f"{title(ablation.term.effect)} was dropped: {ablation.refuted}." for ablation in proof.dropped]
+    unsure = f"its confidence is below {percent(CRITERIA.named)}"
+    notes = [f"{title(ablation.term.effect)} was dropped: {ablation.refuted or unsure}." for ablation in proof.dropped]
     notes += [
         f"{title(ablation.term.effect)} has no visible effect in the held-out recordings: it is not validated by them."
         for index, ablation in enumerate(proof.ablations)

@@ -16,6 +16,7 @@ from hil.identification.laps import Laps
 from hil.identification.measured import Measured
 from hil.identification.observability import Observability, common
 from hil.identification.residual_scales import DISCREPANCY, TORQUE_ACCURACY, inertia, scales
+from hil.identification.whitening import filtered
 from hil.twin.stepping.loops import LEAST_TICKS
 
 # Bounds of the time constant of the motor's observer. Fast: stick-slip decays within a few ticks, so that even a poor
@@ -25,17 +26,30 @@ FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = LEAST_TICKS, 0.
 
 
 class NoiseApart(NamedTuple):
-    """A run without noise, the rows (n,) that it tells, and residuals (n,) by channel of a reference: what the noise
-    makes, and all that was measured."""
+    """A run without the noise of its motion, the rows (n,) that it tells, and what `hil.identification.noise_apart`
+    makes of its residuals (n,) by channel.
+
+    `noise` and `measured` are of a reference with an inertia [motor unit]: what the noise makes, and all that was
+    measured. The motor's is filtered by `taps` (k,) and a gain.
+    """
 
     smooth: Measured
     rows: NDArray[np.bool_]
     noise: dict[str, FloatArray]
     measured: dict[str, FloatArray]
+    inertia: float
+    taps: FloatArray
+    gain: float
 
-    def of(self, channel: str, free: FloatArray) -> FloatArray:
-        """Residual (n,) of a channel with that of the run without noise."""
-        return np.where(self.rows, free + self.noise[channel], self.measured[channel])
+    def of(self, channel: str, free: FloatArray, inertia: float) -> FloatArray:
+        """Residual (n,) of a channel with that of the run without noise, of a twin with an inertia [motor unit]."""
+        if channel != "motor":
+            return np.where(self.rows, free + self.noise[channel], self.measured[channel])
+        found = self.measured[channel].copy()
+        with np.errstate(over="ignore", invalid="ignore"):  # a hypothesis may be unstable
+            torque = (free * (inertia / self.inertia) + self.noise[channel])[self.rows]
+            found[self.rows] = self.gain * filtered(torque, [self.rows], self.taps)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,7 @@ from hil.identification.coordinates import (
 )
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
 from hil.identification.measured import Measured
+from hil.identification.residual_scales import inertia
 from hil.identification.residuals import Residuals, differences
 from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
@@ -277,11 +278,9 @@ class Hypothesis:
                     self.blocks(one.smooth, data.observer_s, fast, rests=run)
                     for one, run in zip(data.apart, runs, strict=True)
                 ]
+                own = inertia(self.resolved.bench)
                 channels = [
-                    {
-                        name: np.where(one.rows, values + one.noise[name], one.measured[name])
-                        for name, values in each.items()
-                    }
+                    {name: one.of(name, values, own) for name, values in each.items()}
                     for one, each in zip(data.apart, free, strict=True)
                 ]
             else:

@@ -1,40 +1,85 @@
-"""Recordings whose noise goes through one twin only: no hypothesis gains by passing less of it.
+"""Recordings below the noise: no hypothesis gains by passing less of the noise of their torque and motion.
 
-    r(theta) = r(theta, smooth) + [r(reference, measured) - r(reference, smooth)]        where the axis slides
-    r(theta) = r(reference, measured)                                                    in the other rows
+    r(theta) = w * e(theta; quiet) J(theta) / J(theta0)                           motor of an axis without a spring
+    r(theta) = w * [e(theta; smooth) J(theta) / J(theta0) + e(theta0; left) - e(theta0; smooth)]      with springs
+    r(theta) = e(theta; .) + [e(theta0; measured) - e(theta0; .)]                 other channels, as the motor
+    r(theta) = e(theta0; measured)                                                rows that do not slide
 
-The noise of a measured torque drives the twin, and that of the encoder corrects it. Least squares of r(theta, measured)
-prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical
-Adjustment of Data, 1943). The smooth recording has the smoothed motion and, where the axis slides, the torque that the
-plain model needs for it. What it lacks of the recording, effects included, stays in the brackets. About a reversal
-smoothed motion tells nothing.
+e: residuals block by block; theta0: a reference; J: inertia. Quiet is a recording with a motion without the noise of
+its encoder, smooth has the torque that the plain model needs for that motion, and left this with what the plain model
+leaves of the measured torque. The noise of a torque drives a twin, and least squares of e(theta; measured) prefers an
+axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical Adjustment of
+Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for every hypothesis.
+A resonance would pass less of it: there it goes through the reference alone. So a fit is least squares of the torque;
+w whitens it by the autoregressive model of what the plain model leaves, so that slow errors do not hide a faster
+effect. About a reversal smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, NoiseApart
+from hil.identification.derivatives import MeasuredMotion, later_motion
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.intended_motion import intended
 from hil.identification.measured import Measured
-from hil.identification.plain_model import PlainModel
-from hil.identification.torque_left import measured_motion
+from hil.identification.noise_floor import rms
+from hil.identification.plain_model import PlainModel, plain_columns
+from hil.identification.residual_scales import inertia
+from hil.identification.torque_left import measured_motion, observed
+from hil.identification.whitening import RANK, filtered, whitening_filter
 
 
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
-    """The recordings of a data set with their noise as it goes through the twin of a reference.
+    """The recordings of a data set with the noise of their torque and motion apart, by the twin of a reference.
 
     The motion is the intended one; beside a second encoder, which the measured motion drives, the smoothed one.
     """
-    apart = []
-    quiet = smoothed_runs if any(run.table_m.size for run in data.runs) else intended_runs
-    for run, smooth in zip(data.runs, quiet(data.runs, plain), strict=True):
-        measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
-        noise = {name: measured[name] - free[name] for name in measured}
-        apart.append(NoiseApart(smooth, measured_motion(run).sliding(plain.slowest), noise, measured))
-    return replace(data, apart=tuple(apart))
+    smoothed = any(run.table_m.size for run in data.runs)
+    return replace(data, apart=tuple(_apart(data, run, reference, plain, smoothed) for run in data.runs))
+
+
+def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel, smoothed: bool) -> NoiseApart:
+    moved, rows = measured_motion(run if smoothed else intended(run)).moved, measured_motion(run).sliding(plain.slowest)
+    needed, taps, gain = np.where(rows, plain.predict(moved), run.torque), np.ones(1), 1.0
+    smooth = replace(run, motor=moved.position, torque=needed, torque_command=needed)
+    measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
+    noise = {name: measured[name] - free[name] for name in measured}
+    if rows.any():
+        taps, left = _whitened(run, moved, needed, rows, plain, run.period_s / data.observer_s)
+        elastic = bool(reference.bench.axis.SPRINGS)
+        driven = replace(smooth, torque=left, torque_command=left) if elastic else _driven(smooth, run)
+        seen = reference.blocks(driven, data.observer_s, rests=run)
+        if not elastic:
+            smooth, free, noise = driven, seen, {name: measured[name] - seen[name] for name in measured}
+        noise["motor"] = seen["motor"] - free["motor"]
+        gain = rms(measured["motor"][rows]) / max(rms(filtered(seen["motor"][rows], [rows], taps)), 1e-300)
+    return NoiseApart(smooth, rows, noise, measured, inertia(reference.resolved.bench), taps, gain)
+
+
+def _driven(smooth: Measured, run: Measured) -> Measured:
+    """The smooth motion with the measured torque."""
+    return replace(smooth, torque=run.torque, torque_command=run.torque)
+
+
+def _whitened(
+    run: Measured, moved: MeasuredMotion, needed: FloatArray, rows: NDArray[np.bool_], plain: PlainModel, a: float
+) -> tuple[FloatArray, FloatArray]:
+    """Filter (k,) that whitens what the plain model leaves behind the observer, and a torque (n,) of model and rest.
+
+    The rest is that of generalised least squares, so that it does not bend the parameters of the plain model.
+    """
+    beyond = run.torque - needed
+    columns = np.column_stack([*plain_columns(later_motion(moved, plain.early_rows)).values()])
+    seen = np.column_stack([observed(one, a)[rows] for one in (beyond, *columns.T)])
+    taps = whitening_filter(seen[:, 0], seen[:, 1:], [rows])
+    white = np.column_stack([filtered(one, [rows], taps) for one in seen.T])
+    again = columns @ np.linalg.lstsq(white[:, 1:], white[:, 0], RANK)[0]
+    return taps, needed + np.where(rows, beyond - again, 0.0)
 
 
 def smoothed_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:

@@ -18,6 +18,7 @@ between stretches that slide, where the sign of the velocity is not known, it go
 
 import math
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -110,7 +111,7 @@ def left_by_plain(model: PlainModel, data: Dataset, deviation: float | None = No
         rows, a = np.flatnonzero(motion.sliding(model.slowest)), run.period_s / data.observer_s
         missing = (motion.torque - model.predict(motion.moved))[rows]
         if rows.size:
-            found.append(_observed(np.interp(np.arange(run.motor.size), rows, missing), a)[rows])
+            found.append(observed(np.interp(np.arange(run.motor.size), rows, missing), a)[rows])
     return _share(found, data, model.slowest, deviation)
 
 
@@ -166,7 +167,7 @@ def _lacking(
         sticks = rows & (moved < 0.5 * scale)
         if not scale > 0.0 or np.count_nonzero(sticks) >= before:
             break
-        found, stuck = innovation * _ADDED * deviation / scale + _observed(more, a), sticks
+        found, stuck = innovation * _ADDED * deviation / scale + observed(more, a), sticks
         before = np.count_nonzero(sticks)
         if before <= _FEW * np.count_nonzero(rows):
             break
@@ -175,10 +176,31 @@ def _lacking(
     return np.asarray(found, dtype=np.float64), stuck
 
 
-def _observed(torque: FloatArray, a: float) -> FloatArray:
+def observed(torque: FloatArray, a: float) -> FloatArray:
     """A torque (n,) behind the filter of the innovation."""
     seen = lfilter([0.0, a * a], [1.0, -(2.0 - 2.0 * a - a * a), 1.0 - 2.0 * a], torque)
     return np.asarray(seen, dtype=np.float64)
+
+
+def quiet_motion(data: Dataset) -> Dataset:
+    """The recordings with the smoothed motion of their encoders."""
+    return data.over(tuple(replace(run, motor=measured_motion(run).moved.position) for run in data.runs))
+
+
+def lacking_torque(hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:
+    """Torque (n,) that moves the motor of each run beyond a twin, on smoothed motion and in the whole band.
+
+    The filter of the innovation is undone, which would make the noise of an encoder large. None where nothing slides.
+    """
+    plain = fit_plain(data)
+    if plain is None:
+        return []
+    still, found = quiet_motion(data), []
+    for run, series in zip(still.runs, needed_torque(hypothesis, still, plain, fast=True), strict=True):
+        a, seen = run.period_s / data.observer_s, -np.nan_to_num(series.left)
+        later, before = np.append(seen[1:], seen[-1:]), np.append(seen[:1], seen[:-1])
+        found.append((later - (2.0 - 2.0 * a - a * a) * seen + (1.0 - 2.0 * a) * before) / (a * a))
+    return found
 
 
 def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray) -> FloatArray:
@@ -197,7 +219,7 @@ def _share(
     return float(np.sqrt(np.mean(left**2)) / deviation) if left.size and deviation > 0.0 else None
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def measured_motion(run: Measured) -> MotionData:
     """Motion and torque of a run for the plain model."""
     return motion_data(run.motor, run.torque, run.period_s, run.evaluated)

@@ -14,7 +14,9 @@ from hil.recording.recording import Recording
 # Share of the motion before the cut, and whether the part after it is held out; the first that fits is taken. Two
 # thirds for training is a common split.
 CUTS = ((2.0 / 3.0, True), (1.0 / 3.0, False), (0.5, True), (0.5, False))
-_COVERED = 0.8  # least top speed in training over that held out: beyond, friction and inertia would be extrapolated
+# Least top speed in training over that held out, and least share of the rows held out at positions of the training:
+# beyond, friction and inertia, or what depends on the place, would be extrapolated.
+_COVERED = 0.8
 _BOTH_WAYS = 0.1  # of the travel, forwards and backwards: less tells no lost motion and no load from friction
 _STARTED = 0.01  # of the travel: above noise and drift of an axis at rest
 _LONG_REST = 0.2  # of the recording: a third keeps less than half of its motion
@@ -24,9 +26,10 @@ _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encode
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
     """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    Both keep their time. The training part is as fast as the other, and both move both ways, where a cut makes it so;
-    else the training part does: of motion in one direction friction and a load are one offset. A part that begins in
-    motion has rows before it, from which the twin gets its state there: every row is evaluated in one part.
+    Both keep their time. The training part is as fast as the other and goes as far, and both move both ways, where a
+    cut makes it so; else the training part does: of motion in one direction friction and a load are one offset. A part
+    that begins in motion has rows before it, from which the twin gets its state there: every row is evaluated in one
+    part.
     """
     train, rest = [], []
     for recording in recordings:
@@ -35,7 +38,8 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
         found = [_cut(recording, begin + round(share * (end - begin)), last) for share, last in CUTS]
         fast = [parts for parts in found if _covers(*parts)] or found[:1]
         told = [parts for parts in fast if _moves_both_ways(parts[0], travel)] or fast
-        parts = next((parts for parts in told if _moves_both_ways(parts[1], travel)), told[0])
+        inside = [parts for parts in told if _within(*parts, travel) >= _COVERED] or told
+        parts = next((parts for parts in inside if _moves_both_ways(parts[1], travel)), inside[0])
         train.append(_led_in(recording, parts[0]))
         rest.append(_led_in(recording, parts[1]))
     return train, rest
@@ -65,7 +69,9 @@ def held_out_note(held_out: Sequence[Recording]) -> str:
     """Sentence on the parts that `split` holds out."""
     first = [one.name for one in held_out if one.name.endswith(f"({FIRST_PART})")]
     text = "No held-out recording was given: the last part of each recording is used for validation"
-    return f"{text}, but {', '.join(first)}, since only the rest reaches the full speed." if first else f"{text}."
+    return (
+        f"{text}, but {', '.join(first)}, since the rest alone reaches its speed and travel." if first else f"{text}."
+    )
 
 
 def same(one: Recording, other: Recording) -> bool:
@@ -94,6 +100,14 @@ def _position(recording: Recording) -> FloatArray:
 def _covers(train: Recording, held_out: Recording) -> bool:
     """True if the training part is about as fast as the part that is held out."""
     return _top_speed(train) >= _COVERED * _top_speed(held_out)
+
+
+def _within(train: Recording, held_out: Recording, travel: float) -> float:
+    """Share of the rows held out that lie where the training part was, but for noise and drift (see `_STARTED`)."""
+    known, there, margin = _position(train), _position(held_out), _STARTED * travel
+    if not known.size or not there.size:
+        return 0.0
+    return float(np.mean((there >= np.min(known) - margin) & (there <= np.max(known) + margin)))
 
 
 def _moves_both_ways(part: Recording, travel: float) -> bool:

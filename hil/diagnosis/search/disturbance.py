@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from hil.arrays import FloatArray
 from hil.identification.least_squares import least_squares
@@ -87,7 +88,10 @@ def orders(
         return [1.0, 2.0]
 
     def on_rows(values: Iterable[FloatArray]) -> FloatArray:
-        return np.concatenate([one[step][row] for one, step, row in zip(values, every, at, strict=True)])
+        means = (
+            uniform_filter1d(one, step.step) if step.step > 1 else one for one, step in zip(values, every, strict=True)
+        )
+        return np.concatenate([one[step][row] for one, step, row in zip(means, every, at, strict=True)])
 
     torque, velocity = on_rows(d.torque for d in disturbances), on_rows(d.velocity for d in disturbances)
     change = on_rows(np.gradient(d.velocity) for d in disturbances)

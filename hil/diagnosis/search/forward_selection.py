@@ -138,12 +138,10 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
                 base, considered = claimed(base), [*considered, *pruned]
                 tried.append(effects(other.fit.terms))
                 continue
-            factors = unexplained_channels(base)
-            if not factors:
+            if not (beside := _beside_unexplained(base, nominal, given)):
                 break
             step("searching the channels that are explained, beside those that are not")
-            louder = base.data.louder(factors)
-            base, nominal, given = (over(louder, one) for one in (base, nominal, given))
+            base, nominal, given = beside
             continue
         del additions  # their residuals are not needed any more
         base, needed = added.fit, added.needed
@@ -153,7 +151,9 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
             continue
         tried.append(effects(base.terms))
         if len(base.terms) >= CRITERIA.in_vain and mismatch_left(nominal, base, base.data) > CRITERIA.most_left:
-            break
+            if not (beside := _beside_unexplained(base, nominal, given)):
+                break
+            base, nominal, given = beside
     found = _best(_Explanation(base, needed, rivals), exchanged_from)
     base, needed, rivals = found.fit, found.needed, found.rivals
     step("fitting the explanation to convergence")
@@ -173,6 +173,15 @@ def _best(last: _Explanation, others: Sequence[_Explanation]) -> _Explanation:
         if one.fit.data is best.fit.data and bic_margin(one.fit, best.fit) >= CRITERIA.tied:
             best = one
     return best
+
+
+def _beside_unexplained(base: Fit, nominal: Fit, given: Fit) -> tuple[Fit, Fit, Fit] | None:
+    """The fits where what is left of unexplained channels counts as noise; None without one beside an explained one."""
+    factors, known = unexplained_channels(base), base.data.set_aside
+    if set(factors) <= set(known):
+        return None
+    louder = base.data.louder({name: value * known.get(name, 1.0) for name, value in factors.items()} | dict(known))
+    return over(louder, base), over(louder, nominal), over(louder, given)
 
 
 def unexplained_channels(fit: Fit) -> dict[str, float]:

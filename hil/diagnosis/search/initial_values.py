@@ -48,10 +48,17 @@ class StartPoint:
         return Term(self.effect, self.variant, self.values if values is None else values, windows=self.windows)
 
 
-def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, FloatArray]], observer_s: float) -> Scene:
+def scene(
+    runs: Sequence[Measured],
+    bench: Bench,
+    blocks: Sequence[dict[str, FloatArray]],
+    observer_s: float,
+    lacking: Sequence[FloatArray] = (),
+) -> Scene:
     """Estimate the quantities that starting values are computed from.
 
-    `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run.
+    `bench` has the nominal parameters as fitted, `blocks` their residuals block by block, one per run. `lacking` is the
+    torque (n,) of each run that its twin lacks, where that is told better than by the motor's residual.
     """
     physics = bench.axis.physics()
     ratio = bench.axis.ratio_m_rad
@@ -59,6 +66,8 @@ def scene(runs: Sequence[Measured], bench: Bench, blocks: Sequence[dict[str, Flo
         estimate.disturbance(run, block["motor"], inertia(bench), observer_s)
         for run, block in zip(runs, blocks, strict=True)
     ]
+    if lacking:
+        disturbances = [replace(one, torque=torque) for one, torque in zip(disturbances, lacking, strict=True)]
     stretch, most_stretch = stretches(runs, ratio) if runs[0].table_m.size else (0.0, 0.0)
     longest = max(range(len(runs)), key=lambda i: runs[i].motor.size)
     begin_s, events = runs[longest].start.time_s, estimate.force_windows(runs[longest], disturbances[longest])

@@ -7,9 +7,9 @@ from hil.diagnosis.acceptance import promises
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Considered, accepted
 from hil.diagnosis.search.addition import Addition
+from hil.diagnosis.search.by_shape import fitted, shown
 from hil.diagnosis.search.restart import companion, from_bench_file, may_hide, together, unbent
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import shown
 from hil.diagnosis.search.successive_halving import race
 from hil.diagnosis.stages import Progress
 from hil.identification.estimator import Fit
@@ -73,7 +73,7 @@ def next_term(search: SearchRound, candidates: Sequence[Candidate], step: Progre
         promising = [one for one in candidates if promises(one.by_channel, base.residuals.by_channel)]
     if promising:
         step("fitting " + ", ".join(one.term.effect for one in promising[:3]))
-        additions = possible(race(base, promising))
+        additions = possible((fitted if base.within_noise else race)(base, promising))
     best = first_standing(additions)
     unclear = best is None or best.fit.cost > CRITERIA.clear * base.cost
     if (

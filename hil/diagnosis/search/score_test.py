@@ -25,6 +25,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import correlation_time, whitened, whitening
 from hil.identification.parallel import POOL
 from hil.identification.terms import Term, compatible, free_slot, repeats
+from hil.identification.torque_left import lacking_torque
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
@@ -111,7 +112,9 @@ def screen_library(base: Fit) -> list[Candidate]:
     Starts whose values, scaled to the residual, are not valid for their mechanism are left out.
     """
     hypothesis, terms = base.hypothesis, base.terms
-    known = scene(base.data.runs, base.bench, hypothesis.residuals(base.data).channels, base.data.observer_s)
+    lacking = lacking_torque(hypothesis, base.data) if base.within_noise else ()
+    blocks = hypothesis.residuals(base.data).channels
+    known = scene(base.data.runs, base.bench, blocks, base.data.observer_s, lacking)
     points = [
         _beside_known(start, hypothesis)
         for start in (*starts(known, hypothesis.bench, base.data.runs), *_events(base))

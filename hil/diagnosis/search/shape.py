@@ -14,32 +14,27 @@ of what is left (`hil.identification.spectrum`). An effect below the noise of a 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaln
-from scipy.stats import t as student
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.facts import axis_facts
-from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.structure_left import TORQUE, channels, least_energy, left_in_channel
+from hil.diagnosis.structure_left import DIFFERENCE, TORQUE, channels, least_energy, left_in_channel
+from hil.identification.coefficient import Coefficient, coefficients, log_tail
 from hil.identification.dataset import Dataset
+from hil.identification.derivatives import MeasuredMotion, matched_motion
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.intended_motion import intended
-from hil.identification.laps import Laps
 from hil.identification.noise_apart import intended_runs, smoothed_runs
-from hil.identification.parallel import in_parallel
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
-from hil.identification.spectrum import spectrum
 from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, measured_motion
-from hil.identification.whitening import RANK, filtered, spread, whitening_filter
+from hil.identification.torque_left import fit_plain, measured_motion, quiet_motion
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.parameter import Role
@@ -49,7 +44,6 @@ _FEWEST_ROWS = 100
 _MANY = (Role.EDGE, Role.LINE, Role.PERIOD, Role.FREQUENCY)
 _FAINT = 0.1  # of the strength of a friction: a small step, its shape is linear in it
 _LARGEST = 1e150  # of a residual: an unstable twin leaves more, and its square overflows
-_UNDERFLOW = 1e-290  # probability below which its floating-point number loses digits
 
 
 def log_chance_below_noise(fit: Fit, without: Fit) -> float | None:
@@ -82,46 +76,69 @@ def _without_harmonics(found: Hypothesis, term: Term) -> Hypothesis | None:
 
 def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
     """`log_chance_of_shape` of one form of a term."""
-    fast = not fitted
-    asked, best = _asked(without, fast), 0.0
-    if asked is None:
-        return best
-    added = _added(found, without)
-    searched, (shaped, share) = _searched(found) - _searched(without.hypothesis), _faint(found, added, without)
-    # then one is the shape, and no nuisance
-    offset = any(Active(term.effect, term.values, term.variant).is_offset for term in added)
-    for channel, own in asked.channels.items():
-        after = left_in_channel(shaped, own.calm, channel, asked.plain, fast)
-        rows = [at & one.clear for at, one in zip(own.rows, after, strict=True)]
-        counted = np.concatenate([one.clear[at] for at, one in zip(own.rows, after, strict=True)])
-        shape = own.quiet[counted] - _joined(after, rows)
-        if shape.size < _FEWEST_ROWS or not _holds(shape):
-            continue
-        beside = own.beside[counted]
-        matrix = np.column_stack([shape, beside[:, ~own.constant] if offset else beside])
-        size, ratio, free = _first_coefficient(
-            matrix, own.measured[counted], rows, [run.laps for run in without.data.runs]
-        )
-        if free > 0.0 and size**2 * float(np.mean(shape**2)) > own.least:
+    searched, best = _searched(found) - _searched(without.hypothesis), 0.0
+    seen = sizes([found], without, not fitted)
+    for (size, ratio, free), energy, rows in (one for each in seen for one in each):
+        if free > 0.0 and energy > 1.0:
             if fitted:
-                removes = max(2.0 * size * share - 1.0, 0.0) / (size * share) ** 2
-                chance = _log_tail(abs(ratio) * removes**0.5, free)
+                removes = max(2.0 * size - 1.0, 0.0) / size**2
+                chance = log_tail(abs(ratio) * removes**0.5, free)
             else:
-                chance = math.log(2.0) + _log_tail(abs(ratio), free)
-            best = min(best, math.log(len(LIBRARY)) + searched * math.log(counted.sum()) + chance)
+                chance = math.log(2.0) + log_tail(abs(ratio), free)
+            number = math.log(min(free * math.log2(rows), rows))
+            best = min(best, math.log(len(LIBRARY) * len(seen)) + searched * number + chance)
     return best
 
 
-def _log_tail(ratio: float, free: float) -> float:
-    """Logarithm of the probability that Student's t exceeds a ratio >= 0, also where that is no floating-point number.
+class Size(NamedTuple):
+    """Size of a term in what a fit leaves, 1 at its own values; its energy over the least that counts; rows."""
 
-    There the first term of the incomplete beta function I_x(a, 1/2), x = free / (free + t^2), a = free / 2 (M.
-    Abramowitz and I. Stegun, Handbook of Mathematical Functions, 26.5.4), with its series as 1 / (1 - x).
+    told: Coefficient
+    energy: float
+    rows: int
+
+
+def sizes(found: Sequence[Hypothesis], without: Fit, fast: bool = True) -> list[list[Size]]:
+    """Sizes of terms, all beside each other, for each way in which they are asked; none where nothing tells.
+
+    Each hypothesis adds one term to that of the fit. `fast`: with the internal steps of a search.
     """
-    if (tail := float(student.sf(ratio, free))) > _UNDERFLOW:
-        return math.log(tail)
-    x, a = free / (free + ratio**2), 0.5 * free
-    return float(a * math.log(x) - 0.5 * math.log1p(-x) - math.log(2.0 * a) - betaln(a, 0.5))
+    plain, asked = _asked(without, fast)
+    if plain is None:
+        return []
+    added = [_added(one, without) for one in found]
+    faint = [_faint(one, terms, without) for one, terms in zip(found, added, strict=True)]
+    # then one is the shape, and no nuisance
+    offset = any(Active(term.effect, term.values, term.variant).is_offset for terms in added for term in terms)
+    laps, every = [run.laps for run in without.data.runs], list[list[Size]]()
+    for of in asked:
+        after = [left_in_channel(one, of.calm, of.channel, plain, fast) for one, _ in faint]
+        clear = [np.logical_and.reduce([one.clear for one in run]) for run in zip(*after, strict=True)]
+        for own in of.seen:
+            rows = [at & one for at, one in zip(own.rows, clear, strict=True)]
+            counted = np.concatenate([one[at] for at, one in zip(own.rows, clear, strict=True)])
+            shapes = [own.quiet[counted] - _joined(one, rows) for one in after]
+            if np.count_nonzero(counted) < _FEWEST_ROWS or not all(_holds(one) for one in shapes):
+                continue
+            beside = own.beside[counted][:, ~own.constant] if offset else own.beside[counted]
+            matrix = np.column_stack([*shapes, beside])
+            told = coefficients(matrix, own.measured[counted], rows, laps, len(found))
+            every.append(
+                [
+                    Size(
+                        one._replace(value=one.value * share),
+                        one.value**2 * float(np.mean(shape**2)) / max(of.least, 1e-300),
+                        shape.size,
+                    )
+                    for one, shape, (_, share) in zip(told, shapes, faint, strict=True)
+                ]
+            )
+    return every
+
+
+def prepare(without: Fit) -> None:
+    """Compute what the shapes of all terms are asked in, in the steps of a search."""
+    _asked(without, True)
 
 
 def _added(found: Hypothesis, without: Fit) -> list[Term]:
@@ -146,58 +163,92 @@ def _faint(found: Hypothesis, added: Sequence[Term], without: Fit) -> tuple[Hypo
 
 
 class _Seen(NamedTuple):
-    """Residuals (m,) of a channel on the rows that slide: of the recordings, and of their `calm` motion (`quiet`).
+    """Residuals (m,) of a channel on the rows that slide: `measured`, and `quiet` of the calm motion.
 
-    Rows in which the twin sticks are left out.
-
-    `beside` (m, q) has the columns of least squares beside a shape, `constant` (q,) marks the offsets among them. A
-    shape of less energy than `least` does not count.
+    Rows in which the twin sticks are left out. `beside` (m, q) has the columns of least squares beside a shape,
+    `constant` (q,) marks the offsets among them.
     """
 
     rows: list[NDArray[np.bool_]]
     measured: FloatArray
-    calm: Dataset
     quiet: FloatArray
     beside: FloatArray
     constant: NDArray[np.bool_]
-    least: float
 
 
 class _Asked(NamedTuple):
-    """Channels of a fit in which a shape is sought, and the plain model."""
+    """A channel in which a shape is sought, with the calm motion that gives it; of less energy it does not count."""
 
-    channels: dict[str, _Seen]
-    plain: PlainModel
+    channel: str
+    calm: Dataset
+    least: float
+    seen: list[_Seen]
 
 
 @lru_cache(maxsize=2)
-def _asked(without: Fit, fast: bool) -> _Asked | None:
-    """Residuals of a fit, for the test of each mechanism's shape; None if the axis slides in no row.
+def _asked(without: Fit, fast: bool) -> tuple[PlainModel | None, list[_Asked]]:
+    """What a fit leaves, in which a shape is sought, and the plain model; None if the axis slides in no row.
 
-    `fast`: with the internal steps of a search.
+    The torque is asked twice: with the measured motion, and with the smoothed one, in which the noise of the encoder
+    does not hide a torque that is faster than the twin's observer. A channel that is set aside tells nothing.
     """
-    data, hypothesis, found = without.data, without.hypothesis, dict[str, _Seen]()
+    data, found = without.data, list[_Asked]()
     plain = fit_plain(data)
     if plain is None:
-        return None
+        return None, found
+    smooth = quiet_motion(data)
     for channel in channels(data):
-        calm = data.over((intended_runs if channel == TORQUE else smoothed_runs)(data.runs, plain))
-        parts, quiet = (left_in_channel(hypothesis, one, channel, plain, fast) for one in (data, calm))
-        rows = [one.rows & one.clear & other.clear for one, other in zip(parts, quiet, strict=True)]
-        measured, own = _joined(parts, rows), _joined(quiet, rows)
-        if measured.size < _FEWEST_ROWS or not (_holds(measured) and _holds(own)):
+        if channel == DIFFERENCE and "table" in data.set_aside:
             continue
-        beside = [np.ones_like(measured)]
-        if channel == TORQUE:
-            moved = [plain_columns(measured_motion(intended(run)).moved) for run in data.runs]
-            beside += [np.concatenate([one[name][at] for one, at in zip(moved, rows, strict=True)]) for name in MOTION]
-        other = (left_in_channel(one, calm, channel, plain, fast) for one in _other_values(without))
-        changed = (_joined(one, rows) - own for one in other)
-        beside += [change for change in changed if _holds(change)]
+        calm = data.over((intended_runs if channel == TORQUE else smoothed_runs)(data.runs, plain))
+        quiet = left_in_channel(without.hypothesis, calm, channel, plain, fast)
+        others = [left_in_channel(one, calm, channel, plain, fast) for one in _other_values(without)]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
-        columns = np.column_stack(beside)
-        found[channel] = _Seen(rows, measured, calm, own, columns, np.ptp(columns, axis=0) == 0.0, least)
-    return _Asked(found, plain)
+        seen = [
+            _seen(parts, quiet, others, _motions(data, channel, held is smooth))
+            for held in ((data, smooth) if channel == TORQUE else (data,))
+            for parts in [left_in_channel(without.hypothesis, held, channel, plain, fast)]
+        ]
+        found.append(_Asked(channel, calm, least, [one for one in seen if one is not None]))
+    return plain, found
+
+
+def _motions(data: Dataset, channel: str, smooth: bool) -> list[list[MeasuredMotion]]:
+    """Motions of each run whose torque by the plain model is beside a shape of the torque.
+
+    The intended one; beside the smoothed motion also that, and that of twice the window: what smoothing takes off a
+    motion is a torque that the twin seems to lack.
+    """
+    if channel != TORQUE:
+        return []
+    found = [[measured_motion(intended(run)).moved for run in data.runs]]
+    for more in (1, 2) if smooth else ():
+        each = [(run, more * (measured_motion(run).window - 1) + 1) for run in data.runs]
+        found.append([matched_motion(run.motor, run.period_s, window) for run, window in each])
+    return found
+
+
+def _seen(
+    parts: Sequence[ResidualSeries],
+    quiet: Sequence[ResidualSeries],
+    others: Sequence[Sequence[ResidualSeries]],
+    motions: Sequence[Sequence[MeasuredMotion]],
+) -> _Seen | None:
+    """Residuals of a channel and of its calm motion; None where too few rows slide, or the twin holds no motion."""
+    rows = [one.rows & one.clear & other.clear for one, other in zip(parts, quiet, strict=True)]
+    measured, own = _joined(parts, rows), _joined(quiet, rows)
+    if measured.size < _FEWEST_ROWS or not (_holds(measured) and _holds(own)):
+        return None
+    beside = [np.ones_like(measured), *(column for moved in motions for column in _of_motion(moved, rows))]
+    changed = (_joined(one, rows) - own for one in others)
+    columns = np.column_stack([*beside, *(change for change in changed if _holds(change))])
+    return _Seen(rows, measured, own, columns, np.ptp(columns, axis=0) == 0.0)
+
+
+def _of_motion(moved: Sequence[MeasuredMotion], rows: Sequence[NDArray[np.bool_]]) -> list[FloatArray]:
+    """Regressors (m,) of the plain model for a motion, on the rows (n,) of each run that count."""
+    columns = [plain_columns(one) for one in moved]
+    return [np.concatenate([one[name][at] for one, at in zip(columns, rows, strict=True)]) for name in MOTION]
 
 
 def _holds(residual: FloatArray) -> bool:
@@ -233,64 +284,3 @@ def _searched(found: Hypothesis) -> float:
         if one.parameter is not None and value != one.parameter.default
     ]
     return sum(1.0 if role in _MANY else 0.5 for role in roles if role is not Role.STRENGTH)
-
-
-def _first_coefficient(
-    matrix: FloatArray, signal: FloatArray, rows: Sequence[NDArray[np.bool_]], laps: Sequence[Laps | None]
-) -> tuple[float, float, float]:
-    """Coefficient of the first column (n, p), the same over its error, and the degrees of freedom; 0 where not told.
-
-    Generalised least squares: both sides are whitened by the autoregressive model of what the columns leave, so that
-    slow errors do not hide a shape that is faster. The error counts what is correlated still (D. W. K. Andrews and J.
-    C. Monahan, Econometrica 60 (1992) 953), and what repeats from lap to lap, as the counts of an encoder do: a lap
-    tells it no better than one. Rows (m,) of each run count.
-    """
-    whole = np.column_stack([signal, matrix])
-    taps = whitening_filter(signal, matrix, rows)
-    signal, *columns = (filtered(one, rows, taps) for one in whole.T)
-    matrix = np.column_stack(columns)
-    scale = np.linalg.norm(matrix, axis=0)
-    scaled = matrix / np.where(scale > 0.0, scale, 1.0)
-    basis, upper = np.linalg.qr(scaled)  # an orthonormal basis: the singular values are those of a small matrix
-    weights = np.linalg.pinv(upper, rcond=RANK) @ basis.T
-    solved = weights @ signal
-    own = upper[:, 0] - upper[:, 1:] @ np.linalg.lstsq(upper[:, 1:], upper[:, 0], rcond=RANK)[0]
-    if float(own @ own) < RANK:  # the others make it
-        return 0.0, 0.0, 0.0
-    splits = np.cumsum([int(at.sum()) for at in rows])[:-1]
-    series = [np.split(one, splits) for one in (signal - scaled @ solved, weights[0], *basis.T)]
-    left, weight, *beside = ([spread(part, at) for part, at in zip(one, rows, strict=True)] for one in series)
-    covariance, free = spectrum(left, beside, rows).covariance([weight])
-    variance = float(covariance[0, 0])
-    if not variance > 0.0:
-        return 0.0, 0.0, 0.0
-    parts = [ResidualSeries(one, at) for one, at in zip(left, rows, strict=True)]
-    repeated = 1.0 + _repeated(parts, series[1], laps) / variance
-    return float(solved[0] / scale[0]), float(solved[0]) / (repeated * variance) ** 0.5, free / repeated
-
-
-def _repeated(parts: Sequence[ResidualSeries], weights: Sequence[FloatArray], laps: Sequence[Laps | None]) -> float:
-    """Variance that a sum of residuals with weights (m,) of the rows has because these repeat from lap to lap."""
-    found = 0.0
-    for part, weight, of in zip(parts, weights, laps, strict=True):
-        if of is None:
-            continue
-        both = part.rows[of.first] & part.rows[of.again]
-        first, again, series = of.first[both], of.again[both], spread(weight, part.rows)
-        if first.size:
-            alike = max(float(np.mean(part.left[first] * part.left[again])), 0.0)
-            found += 2.0 * alike * max(float(series[first] @ series[again]), 0.0)
-    return found
-
-
-def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates whose shape, at the values where their search begins, is in what a base leaves, the clearest first."""
-
-    def chance(one: Candidate) -> float:
-        begun = (base.hypothesis.with_term(term) for term in (one.term, *one.others))
-        return min(log_chance_of_shape(start, base, fitted=False) for start in begun)
-
-    _asked(base, fast=True)  # once, before the jobs ask for it
-    found = zip(in_parallel([partial(chance, one) for one in candidates]), candidates, strict=True)
-    level = [(least, one) for least, one in found if least < math.log(CRITERIA.significance)]
-    return [one for _, one in sorted(level, key=lambda pair: pair[0])]

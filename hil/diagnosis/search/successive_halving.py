@@ -122,14 +122,14 @@ class _Race:
         second = in_parallel([partial(_second_fit, fit) for fit in _unique([*started[:2], *better])])
         del started, better  # derivatives of long recordings take much memory
         ranked = sorted(second, key=lambda fit: fit.cost)
-        leader = _finish(ranked[0])
+        leader = finish(ranked[0])
         others = [fit for fit in _unique([*second[:2], *ranked[:_FINISHED]]) if fit is not ranked[0]]
         results = [leader, *self._followers(leader, ranked[0], others)]
         del second, ranked, others
         results = in_parallel([partial(self._from_start, fit) for fit in results])
         best = min(results, key=lambda fit: fit.cost)
         if not self.search.expired:
-            results += [*self._variants(best), *self._equivalents(best)]
+            results += [*variants(best), *equivalents(self.base, best)]
         fits: dict[str, Fit] = {}
         for fit in results:
             effect = fit.terms[-1].effect
@@ -190,7 +190,7 @@ class _Race:
         beaten = max(_BEATEN * leader.cost, _LEVEL * level.cost)
         again = [] if leader.at_floor else [partial(self._from_bench_file, before)]
         near = [
-            partial(_finish, other)
+            partial(finish, other)
             for other, fit in zip(others, reached, strict=True)
             if fit.cost < beaten and self._gain(fit) > _BEHIND * self._gain(leader)
         ]
@@ -199,7 +199,7 @@ class _Race:
     def _from_bench_file(self, fit: Fit) -> Fit:
         """Fit the same mechanism from the parameters of the bench with its own derivatives."""
         again = self._given_start(self._candidate(fit)).refit(SECOND, soft=SOFT)
-        return _finish(again) if self._gain(again) > 0.0 else again
+        return finish(again) if self._gain(again) > 0.0 else again
 
     def _candidate(self, fit: Fit) -> Candidate:
         return next(one for one in self.candidates if one.term.effect == fit.terms[-1].effect)
@@ -209,22 +209,6 @@ class _Race:
         start = self._best_start(self._candidate(fit), self.base.hypothesis.x)
         start = self.base.estimator.evaluate(start.hypothesis)
         return fit if fit.cost <= start.cost else start.refit(LONG)
-
-    def _variants(self, fit: Fit) -> list[Fit]:
-        """Fit the other variants of the last term from its values."""
-        rebased, others = fit.hypothesis.rebased, other_variants(fit.terms[-1], fit.bench)
-        return in_parallel([partial(_fit_fast_first, fit.estimator, rebased.replaced(-1, term)) for term in others])
-
-    def _equivalents(self, fit: Fit) -> list[Fit]:
-        """Fit the mechanisms that may have the same effect as the last term on this motion."""
-        terms, rebased = fit.terms, fit.hypothesis.rebased
-        jobs = []
-        for alike in likenesses(terms, fit.bench):
-            if offered(alike[0], self.base.hypothesis, terms[:-1]):
-                begun = in_parallel([partial(fit.estimator.evaluate, rebased.replaced(-1, term)) for term in alike])
-                nearest = min(begun, key=lambda other: other.cost)
-                jobs.append(partial(_fit_fast_first, fit.estimator, nearest.hypothesis))
-        return in_parallel(jobs)
 
     def _gain(self, fit: Fit) -> float:
         return self.base.cost - fit.cost
@@ -238,13 +222,31 @@ def _second_fit(first: _FirstFit) -> Fit:
     return replace(second, jacobian=second.jacobian[:, :0].copy())  # few fits are continued, and memory is dear
 
 
+def variants(fit: Fit) -> list[Fit]:
+    """Fit the other variants of the last term from its values."""
+    rebased, others = fit.hypothesis.rebased, other_variants(fit.terms[-1], fit.bench)
+    return in_parallel([partial(_fit_fast_first, fit.estimator, rebased.replaced(-1, term)) for term in others])
+
+
+def equivalents(base: Fit, fit: Fit) -> list[Fit]:
+    """Fit the mechanisms that may have the same effect as the last term of a fit on this motion."""
+    terms, rebased = fit.terms, fit.hypothesis.rebased
+    jobs = []
+    for alike in likenesses(terms, fit.bench):
+        if offered(alike[0], base.hypothesis, terms[:-1]):
+            begun = in_parallel([partial(fit.estimator.evaluate, rebased.replaced(-1, term)) for term in alike])
+            nearest = min(begun, key=lambda other: other.cost)
+            jobs.append(partial(_fit_fast_first, fit.estimator, nearest.hypothesis))
+    return in_parallel(jobs)
+
+
 def _fit_fast_first(last: Estimator, hypothesis: Hypothesis) -> Fit:
     """Converge with the steps of a search, then with those of the twin."""
     fast = replace(last, fast=True).fit(hypothesis)
     return last.fit(fast.hypothesis, evaluations=SECOND, slopes=fast.jacobian)
 
 
-def _finish(fit: Fit) -> Fit:
+def finish(fit: Fit) -> Fit:
     """Converge a fit, at last with the final weights."""
     if any(coordinate.edge for coordinate in fit.hypothesis.coordinates):
         fit = fit_windows(_edges_moved(fit.refit(LONG, slopes=fit.jacobian)))

@@ -220,6 +220,7 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
                 train = (train * own[channel] + beyond) / (own[channel] + inside)
             else:
                 more, gain = beyond / inside, _gain(own_held_out, there)
+        acts = bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other))
         return Ablation(
             term,
             other,
@@ -228,27 +229,27 @@ def _ablate(given: Fit, nominal: Fit, final: Fit, held_out: Dataset) -> list[Abl
             more,
             gain,
             unrepeated(other.hypothesis, other.data) / differs if differs > 0.0 else None,
-            bool(there and own_held_out and _change(own_held_out, there) > CRITERIA.acts * _change(final, other)),
+            acts,
             clear(index, term, other, log_chance),
             log_chance,
             _quiet(final, other),
             torque_of(final, other, term, held_out, given),
-            _by_torque(final, other, term, held_out),
+            _by_torque(final, other, term, [final.data, *([held_out] if acts else [])]),
             harm(final, other, given),
         )
 
     return [ablation(index, term, other) for index, (term, other) in enumerate(zip(final.terms, fits, strict=True))]
 
 
-def _by_torque(fit: Fit, without: Fit, term: Term, held_out: Dataset) -> float:
-    """Energy of the torque missed without a term over that with it, the lower of training and held-out recordings.
+def _by_torque(fit: Fit, without: Fit, term: Term, every: Sequence[Dataset]) -> float:
+    """Energy of the torque missed without a term over that with it, the least of the data sets on which it acts.
 
     Below the noise of a row, where the energy of the position is that of the noise with a term and without; else 1.
     """
-    every = [torque_of(fit, without, term, data) for data in (fit.data, held_out) if data.runs]
-    if term.windows or not without.within_noise or not every:
+    if term.windows or not without.within_noise:
         return 1.0
-    return min((one[1] / one[0]) ** 2 if one and one[0] > 0.0 else 1.0 for one in every)
+    told = [torque_of(fit, without, term, data) for data in every]
+    return min((one[1] / one[0]) ** 2 if one and one[0] > 0.0 else 1.0 for one in told)
 
 
 def _change(fit: Fit, without: Fit) -> float:

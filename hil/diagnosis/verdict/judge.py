@@ -35,7 +35,8 @@ class Remainder:
 
     `told` is the share without the channels whose remainder is like noise (`like_noise`), `above` the largest mean
     square of the others over their noise. `open_inputs`: inputs of the twin are open or nothing is known of the control
-    law, so that something is left beside any name. `at_floor`: the training recordings are explained.
+    law, so that something is left beside any name. `at_floor`: the training recordings are explained. `below_noise`:
+    they were so without the terms, whose shapes are their evidence, and held-out ones are with them.
     """
 
     left: float
@@ -43,6 +44,7 @@ class Remainder:
     above: float
     open_inputs: bool
     at_floor: bool
+    below_noise: bool
 
 
 def judge(tested: Tested) -> Judged:
@@ -119,6 +121,7 @@ def explanation(nominal: Fit, final: Fit, held_out: Dataset, of_law: Collection[
         above=max((ratio for ratios in of_runs for name, ratio in ratios.items() if name not in noise), default=0.0),
         open_inputs=coarse or not final.data.observability.closed_loop,
         at_floor=final.at_floor,
+        below_noise=nominal.within_noise and (not held_out.runs or final.on(held_out).within_noise),
     )
     return examine(EXPLAINED, measured, CRITERIA)
 

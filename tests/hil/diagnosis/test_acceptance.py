@@ -184,7 +184,7 @@ def test_less_torque_held_out_outweighs_the_position() -> None:
 
 
 def test_open_inputs_leave_something_beside_a_right_name() -> None:
-    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False, "told": 0.3}
+    measured = {"left": 0.3, "above": 4.0, "open_inputs": False, "at_floor": False, "told": 0.3, "below_noise": False}
     closed: Any = SimpleNamespace(**measured)
     opened: Any = SimpleNamespace(**(measured | {"open_inputs": True}))
     assert not accepted(examine(EXPLAINED, closed, CRITERIA))
@@ -195,8 +195,11 @@ def test_open_inputs_leave_something_beside_a_right_name() -> None:
 def test_noise_of_any_colour_beside_a_name_that_explains_something_is_no_mismatch(
     left: float, told: float, stands: bool
 ) -> None:
-    of: Any = SimpleNamespace(left=left, told=told, above=20.0, open_inputs=False, at_floor=False)
-    assert accepted(examine(EXPLAINED, of, CRITERIA)) is stands
+    of = {"left": left, "told": told, "above": 20.0, "open_inputs": False, "at_floor": False, "below_noise": False}
+    above: Any = SimpleNamespace(**of)
+    assert accepted(examine(EXPLAINED, above, CRITERIA)) is stands
+    below: Any = SimpleNamespace(**(of | {"below_noise": True}))  # the energy of a row says nothing of its terms
+    assert accepted(examine(EXPLAINED, below, CRITERIA))
 
 
 def test_a_score_must_promise_evidence_and_energy() -> None:

@@ -68,6 +68,19 @@ def test_the_fast_moves_are_in_training(slow_first: Recording) -> None:
     assert held_out_note([held_out]).endswith("validation.")
 
 
+def test_the_part_held_out_lies_within_the_travel_of_the_training() -> None:
+    """Swings whose last third goes on to a place where the axis was not before."""
+    time_s = np.arange(ROWS) * PERIOD_S
+    position = 0.1 * np.sin(2.0 * np.pi * time_s) + np.where(time_s > 4.0, 0.3 * (time_s - 4.0), 0.0)
+    farther = swinging(rest=False)
+    columns = farther.columns | {"motor_position_m": position, "position_command_m": position}
+    (train,), (held_out,) = split([replace(farther, columns=columns)])
+    assert held_out.name.endswith("(first part)")
+    near = held_out["motor_position_m"]
+    known = train["motor_position_m"]
+    assert np.mean((near >= known.min()) & (near <= known.max())) > 0.8
+
+
 def test_the_part_held_out_moves_both_ways() -> None:
     """A third is one slow feed: friction and a load would be one offset in it."""
     feeds = moved([(0.15, 0.02), (0.15, 0.06)])

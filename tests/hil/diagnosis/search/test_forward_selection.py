@@ -61,6 +61,15 @@ def test_a_channel_is_set_aside_where_another_is_explained(ratios: dict[str, flo
     assert forward_selection.unexplained_channels(fit) == pytest.approx(left)
 
 
+def test_a_channel_that_is_set_aside_is_not_set_aside_again() -> None:
+    """Else two factors follow each other without end: each is told beside the noise of the other."""
+    observability = SimpleNamespace(exact_input=True, hidden=frozenset())
+    data = SimpleNamespace(observability=observability, set_aside={"table": 4.0})
+    fit: Any = SimpleNamespace(noise_ratios=({"motor": 1.0, "table": 2.0},), data=data)
+    assert forward_selection.unexplained_channels(fit)
+    assert forward_selection._beside_unexplained(fit, fit, fit) is None
+
+
 def test_a_term_that_is_removed_again_gives_its_place_to_the_next_that_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     def fit(*effects: str) -> Any:
         terms = tuple(Term(effect, 0, (1.0,) * len(BY_ID[effect].names)) for effect in effects)

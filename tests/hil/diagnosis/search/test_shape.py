@@ -8,18 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
-from scipy.integrate import quad
-from scipy.stats import t as student
 
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.search.by_shape import _resolved, fitted, shown
+from hil.diagnosis.search.forward_selection import over
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import _first_coefficient, _log_tail, log_chance_below_noise, log_chance_of_shape, shown
+from hil.diagnosis.search.shape import log_chance_below_noise, log_chance_of_shape
 from hil.identification.estimator import Fit
-from hil.identification.laps import Laps
+from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
+from hil.identification.torque_left import fit_plain, measured_motion
 
 KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
@@ -29,13 +30,21 @@ NEEDED = math.log(CRITERIA.significance)
 DELAY = Term("transport_delay", 1, (0.5 * KNOWN.gains.period_s,))
 
 
-def base(*terms: Term) -> Fit:
+def base(*terms: Term, torque_noise_n_m: float = 0.3) -> Fit:
     """A twin without new terms on an axis whose torque was measured with much noise."""
-    recording = changed(recorded(KNOWN, *terms, times=6, torque_noise_n_m=0.3), torque_command_n_m=None)
+    recording = recorded(KNOWN, *terms, times=6, torque_noise_n_m=torque_noise_n_m)
+    recording = changed(recording, torque_command_n_m=None)
     recording = replace(recording, metadata={**recording.metadata, "source": "log.csv"})
     fit = fit_nominal_parameters(prepare([recording], [], OWNER).train)
     assert fit.within_noise
     return fit
+
+
+def apart(fit: Fit) -> Fit:
+    """The fit as a search has it, with the noise apart."""
+    plain = fit_plain(fit.data)
+    assert plain is not None
+    return over(noise_apart(fit.data, fit.hypothesis.given, plain), fit)
 
 
 @pytest.mark.parametrize(("terms", "told"), [((COGGING,), True), ((), False)])
@@ -43,7 +52,7 @@ def test_a_shape_below_the_noise_is_told_where_it_is(terms: tuple[Term, ...], to
     without = base(*terms)
     begun = without.estimator.evaluate(without.hypothesis.with_term(COGGING))
     assert (log_chance_of_shape(begun.hypothesis, without) < NEEDED) == told
-    assert [one.term for one in shown(without, [Candidate(COGGING, 0.0)])] == [COGGING] * told
+    assert bool(shown(without, [Candidate(COGGING, 0.0)])) == told
 
 
 def test_a_shape_of_the_opposite_sign_is_told_only_before_it_is_fitted() -> None:
@@ -63,31 +72,34 @@ def test_a_delay_or_a_resonance_that_passes_less_noise_is_not_told() -> None:
         assert chance > NEEDED
 
 
-@pytest.mark.parametrize("free", [3.0, 40.0, 3e3, 1e5])
-@pytest.mark.parametrize("ratio", [0.0, 2.0, 30.0, 90.0, 1e3])
-def test_the_tail_of_students_t_is_told_where_it_is_no_floating_point_number(ratio: float, free: float) -> None:
-    """Two shapes whose chances are both 0.0 as numbers can be ordered by their logarithms."""
+def test_a_start_gets_the_size_and_angle_that_the_torque_tells() -> None:
+    without = apart(base(COGGING, torque_noise_n_m=0.15))
+    wrong = replace(COGGING, values=(0.001, 6.0, 2.0))
+    (found,) = shown(without, [Candidate(wrong, 0.0)])
+    size, order, angle = found.term.values
+    assert order == 6.0
+    assert size == pytest.approx(COGGING.values[0], rel=0.3)
+    assert math.remainder(angle - COGGING.values[2], 2.0 * math.pi) == pytest.approx(0.0, abs=0.5)
+    best = fitted(without, [found])[0]
+    assert best.terms[-1].effect == "cogging_torque"
+    assert best.terms[-1].values[:2] == pytest.approx(COGGING.values[:2], rel=0.3)
 
-    def over_density(way: float) -> float:
-        return math.exp(student.logpdf(ratio + way, free) - student.logpdf(ratio, free))
 
-    width = 1.0 / max(1.0, ratio * (free + 1.0) / (free + ratio**2))
-    area = width * quad(lambda way: over_density(width * way), 0.0, math.inf, limit=400)[0]
-    assert _log_tail(ratio, free) == pytest.approx(student.logpdf(ratio, free) + math.log(area), abs=0.02)
+def test_a_start_gets_the_sign_that_the_torque_tells_or_is_not_begun() -> None:
+    without = apart(base(Term("constant_load", 0, (-0.2,))))
+    (found,) = shown(without, [Candidate(Term("constant_load", 0, (0.01,)), 0.0)])
+    assert found.term.values == pytest.approx((-0.2,), rel=0.1)
+    with_drag = apart(base(Term("nonlinear_viscous_friction", 0, (-2e-5,))))
+    (of_drag,) = shown(with_drag, [Candidate(Term("nonlinear_viscous_friction", 0, (1e-6,)), 0.0)])
+    assert of_drag.term.values[0] < 0.0
 
 
-def test_noise_that_repeats_from_lap_to_lap_tells_no_more_than_one_lap() -> None:
-    rng, lap, rows = np.random.default_rng(5), 1200, np.ones(2400, dtype=bool)
-    laps = Laps(np.arange(lap), np.arange(lap) + lap)
-    shape = np.tile(np.sin(0.05 * np.arange(lap)), 2)
-    matrix = np.column_stack([shape, np.ones(2 * lap)])
-    ratios = {"repeats": list[float](), "not told": list[float](), "does not": list[float]()}
-    for _ in range(120):
-        same, other = np.tile(rng.standard_normal(lap), 2), rng.standard_normal(2 * lap)
-        ratios["repeats"].append(_first_coefficient(matrix, same, [rows], [laps])[1])
-        ratios["not told"].append(_first_coefficient(matrix, same, [rows], [None])[1])
-        ratios["does not"].append(_first_coefficient(matrix, other, [rows], [laps])[1])
-    spread = {name: float(np.std(values)) for name, values in ratios.items()}
-    assert spread["repeats"] == pytest.approx(1.0, abs=0.15)
-    assert spread["does not"] == pytest.approx(1.0, abs=0.15)
-    assert spread["not told"] > 1.25  # what the error would be wrong by
+def test_a_wave_that_the_rows_do_not_resolve_is_not_begun() -> None:
+    without = base(COGGING)
+    plain = fit_plain(without.data)
+    assert plain is not None
+    moved = [(run, measured_motion(run)) for run in without.data.runs]
+    steps = [np.abs(np.diff(run.motor, append=run.motor[-1]))[one.sliding(plain.slowest)] for run, one in moved]
+    highest = math.pi / float(np.median(np.concatenate(steps)))  # two rows for each cycle
+    begun = [Term("cogging_torque", 0, (0.05, order, 0.4)) for order in (6.0, 0.9 * highest, 1.1 * highest)]
+    assert [_resolved(without, one) for one in begun] == [True, True, False]

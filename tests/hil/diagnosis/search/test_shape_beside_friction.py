@@ -65,8 +65,8 @@ def test_the_torque_that_a_twin_lacks_is_told_where_it_sticks_without(without: F
 def test_the_energy_of_the_torque_counts_below_the_noise_alone(without: Fit) -> None:
     fit = without.estimator.fit(without.hypothesis.with_term(COGGING))
     (run,) = without.data.runs
-    none, part = without.data.over([]), without.data.over([run.until(run.motor.size // 4)])
-    told = _by_torque(fit, without, fit.terms[0], none)
+    whole, part = without.data, without.data.over([run.until(run.motor.size // 4)])
+    told = _by_torque(fit, without, fit.terms[0], [whole])
 
     def ratio(data: Dataset) -> float:
         left = [torque_missed(one, data) or math.nan for one in (fit, without)]
@@ -75,8 +75,8 @@ def test_the_energy_of_the_torque_counts_below_the_noise_alone(without: Fit) -> 
     assert told == pytest.approx(ratio(without.data))
     assert told > 1.0
     assert ratio(part) != pytest.approx(told, rel=1e-3)
-    assert _by_torque(fit, without, fit.terms[0], part) == pytest.approx(min(told, ratio(part)))
-    assert _by_torque(fit, more_friction(without, 3.0), fit.terms[0], none) == 1.0
+    assert _by_torque(fit, without, fit.terms[0], [whole, part]) == pytest.approx(min(told, ratio(part)))
+    assert _by_torque(fit, more_friction(without, 3.0), fit.terms[0], [whole]) == 1.0
 
 
 def test_a_strength_is_sure_by_its_error_or_by_its_shape(without: Fit) -> None:

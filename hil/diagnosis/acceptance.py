@@ -155,7 +155,7 @@ def _torque(of: Addition | Ablation, c: Criteria) -> Answer | None:
 
 
 def _explains(of: Remainder, c: Criteria) -> Answer:
-    """Little is left beside noise; with open inputs, or at the floor, most is explained; below the noise is nothing."""
+    """Little is left beside noise; with open inputs, or at the floor, less than half; not asked below the noise."""
     stands = (
         of.below_noise
         or (of.left < 1.0 and names_stand(of.told, of.above, c))

@@ -1,4 +1,4 @@
-"""What the user of a file adds to it: its sampling rate, its axis, and a README or data sheet with sizes and units."""
+"""Hints of a user about a file: sampling rate, axis, and a README or data sheet with sizes and units."""
 
 from collections.abc import Mapping
 from dataclasses import replace

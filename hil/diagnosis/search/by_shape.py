@@ -26,7 +26,7 @@ from hil.identification.torque_left import fit_plain, measured_motion
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 
-_FITTED = 5  # terms with the clearest shapes
+_FITTED = 5  # terms with the clearest shapes: as many as a race by cost fits a second time
 
 
 def shown(base: Fit, candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -95,7 +95,7 @@ def _median_step(data: Dataset) -> float:
 
 
 def _place(term: Term) -> tuple[object, ...]:
-    """What tells starts apart that differ in more than strength and phase."""
+    """Variant, windows and values of a start, without strength and phase if least squares tell these."""
     if not _is_scaled(term):
         return term.variant, term.values
     apart = {index for pair in _pairs(term) for index in pair}

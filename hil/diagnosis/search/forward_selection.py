@@ -176,7 +176,7 @@ def _best(last: _Explanation, others: Sequence[_Explanation]) -> _Explanation:
 
 
 def _beside_unexplained(base: Fit, nominal: Fit, given: Fit) -> tuple[Fit, Fit, Fit] | None:
-    """The fits where what is left of unexplained channels counts as noise; None without one beside an explained one."""
+    """The fits with what unexplained channels leave counted as noise; None if there is no such channel any more."""
     factors, known = unexplained_channels(base), base.data.set_aside
     if set(factors) <= set(known):
         return None

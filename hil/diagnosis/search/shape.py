@@ -85,6 +85,7 @@ def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
                 chance = log_tail(abs(ratio) * removes**0.5, free)
             else:
                 chance = math.log(2.0) + log_tail(abs(ratio), free)
+            # values told apart: the independent ones of an octave, each octave with the same share of the chance
             number = math.log(min(free * math.log2(rows), rows))
             best = min(best, math.log(len(LIBRARY) * len(seen)) + searched * number + chance)
     return best
@@ -187,7 +188,7 @@ class _Asked(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _asked(without: Fit, fast: bool) -> tuple[PlainModel | None, list[_Asked]]:
-    """What a fit leaves, in which a shape is sought, and the plain model; None if the axis slides in no row.
+    """The plain model, and the residuals of a fit in which shapes are sought; no model if the axis never slides.
 
     The torque is asked twice: with the measured motion, and with the smoothed one, in which the noise of the encoder
     does not hide a torque that is faster than the twin's observer. A channel that is set aside tells nothing.

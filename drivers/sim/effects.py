@@ -114,6 +114,8 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "torque_ripple": Definition(
         "torque times 1 + fraction sin(cycles theta + phase), unseen by the current",
         {"fraction": ParameterRange(0.0, 1.0), "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE_0}),
+    "torque_constant_gradient": Definition(
+        "torque times 1 + slope r theta, at least 0, unseen by the current", {"slope_1_m": _ANY}),
     "torque_constant_saturation": Definition(
         "torque = u (1 - c u^2), unseen by the current, held at its maximum beyond it",
         {"coefficient_1_n2_m2": _AT_LEAST_0}),

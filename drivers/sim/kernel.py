@@ -155,7 +155,7 @@ def advance(p: Any, s: Any, lines: Any, command: float, steps: int) -> None:
         acting = 0.5 * (s.torque + torque)
         s.torque = torque
         if p.angle_torque:
-            acting = angle_torque(p, acting, q[0] / p.screw_ratio, time_s)
+            acting = angle_torque(p, acting, q[0] / p.screw_ratio, q[0], time_s)
         for i in range(p.masses):
             force[i] = 0.0
         force[0] = (acting - p.constant_load.load_torque_n_m) / p.drive_ratio

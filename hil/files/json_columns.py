@@ -6,6 +6,7 @@
 [{"stamp": {"secs": 1, "nsecs": 5}, "name": ["a"], "position": [0.1]}, ...]     a message per row, as of ROS
 {"columns": ["t", "x"], "data": [[0, 0.1], ...]}     a table
 [{"name": "x", "unit": "mm", "values": [...]}, ...]  an object per channel
+{"x": {"unit": "mm", "data": [...]}, ...}            the same by name
 [{"meta": {"name": "x", "EGU": "mm"}, "data": [{"secs": 1, "nanos": 5, "val": 0.1}, ...]}, ...]
 {"x": [[0, 0.1], ...], "y": [[0, 1], ...]}           values with stamps of each channel (`json_points`)
 [["t", "x"], [0, 0.1], [1, 0.2]]                     a matrix, with a row of names or without
@@ -25,7 +26,7 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.errors import InputError, listed
 from hil.files.input_file import MOST_BYTES, check_file, check_values, parsing
-from hil.files.json_points import NAME_KEYS, VALUE_KEYS, first_of, rows_of_points, stamp_of
+from hil.files.json_points import NAME_KEYS, UNIT_KEYS, VALUE_KEYS, first_of, rows_of_points, stamp_of
 
 _SELDOM = 0.05  # share of the records: a value that fewer have is no channel
 MOST_JSON_BYTES = MOST_BYTES // 10  # three characters may become an object of 72 bytes
@@ -174,6 +175,13 @@ def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> No
                 into.scalars[f"{within}{name}"] = float(value)
             elif isinstance(value, str):
                 into.texts[f"{within}{name}"] = value
+            elif (
+                isinstance(value, dict)
+                and (own := first_of(value, VALUE_KEYS, list))
+                and not isinstance(own[0], dict | list)
+            ):
+                lists[name] = own
+                units.update({name: unit} if (unit := first_of(value, UNIT_KEYS, str)) else {})
             elif isinstance(value, dict | list):
                 if isinstance(value, dict) and all(isinstance(unit, str) for unit in value.values()):
                     units.update(value)

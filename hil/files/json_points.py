@@ -13,7 +13,7 @@ from hil.files.date_stamps import is_date
 NAME_KEYS = ("name", "channel", "id", "target", "pv", "tag", "signal", "variable", "__name__")
 VALUE_KEYS = ("values", "data", "samples", "datapoints", "points")
 STAMP_KEYS = (("secs", "sec"), ("nsecs", "nanosec", "nsec", "nanos"))
-_UNIT_KEYS = ("unit", "units", "EGU", "egu")
+UNIT_KEYS = ("unit", "units", "EGU", "egu")
 _TIME_KEYS = ("time", "timestamp", "ts", "t", "date", "stamp", "millis", "x")
 _TIMES_KEYS = ("timestamps", "times", "time", "t", "stamps")
 _POINT_KEYS = ("value", "val", "v", "y")
@@ -70,7 +70,7 @@ def _channels(data: object) -> list[_Channel]:
             points = list(zip(times, points, strict=True))
         if name is None or not points or not all(map(_is_point, points)):
             return []
-        found.append(_Channel(name, first_of(flat, _UNIT_KEYS, str) or "", points))
+        found.append(_Channel(name, first_of(flat, UNIT_KEYS, str) or "", points))
     return found
 
 

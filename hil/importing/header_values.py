@@ -1,8 +1,9 @@
 """Constants that a file gives beside its columns: in lines above the numbers, or as scalars with a name.
 
-A line holds one or several of "words [(unit)] [: = ; ,] number [unit]". The words of a constant end those before the
-number; a ratio of units such as N m/A or counts/rev says by itself what it is. Words are those of `lexicon.yaml`,
-compared without accents; a scalar has its unit in its name.
+A line holds one or several of "words [(unit)] [: = ; ,] number [unit] [words]". The words of a constant end those
+before the number, or follow its unit ("a screw with 5 mm lead"); a ratio of units such as N m/A or counts/rev says by
+itself what it is. Words are those of `lexicon.yaml`, compared without accents; a scalar has its unit in its name. The
+way per turn of the motor goes before all other words of a lead, which may be behind a gear.
 """
 
 import re
@@ -26,13 +27,17 @@ class HeaderValue:
 
 @dataclass(frozen=True)
 class _Statement:
-    """Words, the number that follows them, the texts that may be its unit, the whole text, and the last phrase."""
+    """Words, the number that follows them, the texts that may be its unit, the whole text, and the last phrase.
+
+    `of_motor`: it is a way per turn of the motor.
+    """
 
     words: str
     number: float
     units: tuple[str, ...]
     text: str
     phrase: str = ""
+    of_motor: bool = False
 
 
 _NUMBER = re.compile(r"(?<![\w.])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
@@ -47,8 +52,14 @@ _PER = re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
 _WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
+# 32 mm feed per motor revolution
+_PER_MOTOR_TURN = re.compile(r"^ *([a-z]+)(?: [a-z]+){0,4} ?(?:/|\b(?:per|pro|je)\b) ?motor[ -]?(?:turn|rev|umdr)")
+_SENTENCES = re.compile(r"->|\. ")
+_ENDS = re.compile(r"[\[\](){},;|\t\">:]|->|\. ")
+_DEVIATES = re.compile(r"\b(error|deviation|tolerance|fehler|abweichung|toleranz)")
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
+_MOST_WORDS = 3  # of a constant, behind a number
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
 _IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
 
@@ -59,20 +70,16 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
         given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}", words))
-    found: dict[tuple[bool, Constant], list[HeaderValue]] = {}
+    # what is said of the motor goes before what words say, and that before what a unit alone says
+    found: dict[Constant, dict[tuple[bool, bool], list[HeaderValue]]] = {}
     for one in given:
         units = one.units if any(one.units) else (*one.units, None)
         if told := next((known for unit in units if (known := _constant(one, unit))), None):
             by_words, constant, value = told
-            found.setdefault((by_words, constant), []).append(HeaderValue(value, one.text))
-    # what words say goes before what a unit alone says
-    same = {key: values[0] for key, values in found.items() if len({value.value for value in values}) == 1}
-    alone = {
-        constant: value
-        for (by_words, constant), value in same.items()
-        if not by_words and (True, constant) not in found
-    }
-    return alone | {constant: value for (by_words, constant), value in same.items() if by_words}
+            rank = one.of_motor, by_words
+            found.setdefault(constant, {}).setdefault(rank, []).append(HeaderValue(value, one.text))
+    best = {constant: ranked[max(ranked)] for constant, ranked in found.items()}
+    return {constant: values[0] for constant, values in best.items() if len({one.value for one in values}) == 1}
 
 
 def _statements(line: str) -> Iterator[_Statement]:
@@ -88,20 +95,45 @@ def _statements(line: str) -> Iterator[_Statement]:
         return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
-        before = folded[matches[index - 1].end() if index else 0 : match.start()]
+        before = _SENTENCES.split(folded[matches[index - 1].end() if index else 0 : match.start()])[-1]
         end = matches[index + 1].start() if index + 1 < len(matches) else len(folded)
-        value = _number(match[0])
-        if value is None or not re.search(r"[^\W\d]", before) or _is_list(folded, matches[index:], value):
+        value, behind = _number(match[0]), folded[match.end() : end]
+        if value is None or _is_list(folded, matches[index:], value):
             continue
-        bracket = _BRACKET.search(before)
-        name, unit = _unit_of_name(before)
-        behind = tuple(_units_behind(folded[match.end() : end]))
-        units = [_SIGNS.sub("", bracket[1])] if bracket else []
-        told = before[: bracket.start()] if bracket else before
-        words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
-        if unit and not any(behind) and not bracket:
-            words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
-        yield _Statement(words, value, (*units, *behind), header_text(line), phrase)
+        if not _BRACKET.search(before):
+            yield from _words_behind(before, value, behind, end == len(folded), header_text(line))
+        if re.search(r"[^\W\d]", before):
+            yield _words_before(before, value, behind, header_text(line))
+
+
+def _words_before(before: str, value: float, behind: str, line: str) -> _Statement:
+    """The statement of a number that stands behind its words."""
+    bracket = _BRACKET.search(before)
+    name, unit = _unit_of_name(before)
+    units_behind = tuple(_units_behind(behind))
+    units = [_SIGNS.sub("", bracket[1])] if bracket else []
+    told = before[: bracket.start()] if bracket else before
+    words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
+    if unit and not any(units_behind) and not bracket:
+        words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
+    return _Statement(words, value, (*units, *units_behind), line, phrase)
+
+
+def _words_behind(before: str, value: float, text: str, last: bool, line: str) -> Iterator[_Statement]:
+    """Statements of a number whose words follow its unit: a ball screw with 10 mm pitch, 2.4 Nm rated torque.
+
+    `last`: no other number follows, to which the words might belong.
+    """
+    if turn := _PER_MOTOR_TURN.match(text):
+        yield _Statement("lead", value, (turn[1],), line, of_motor=True)
+        return
+    phrase, *others = _ENDS.split(text)
+    unit, *behind = _plain(phrase).split() or [""]
+    if not behind or not (last or others) or _DEVIATES.search(phrase):
+        return
+    name = re.sub(rf" ({'|'.join(lexicon().joints)})$", "", _plain(before))
+    for take in range(1, min(len(behind), _MOST_WORDS) + 1):
+        yield _Statement(f"{name} {' '.join(behind[:take])}", value, (unit,), line)
 
 
 def _is_list(text: str, matches: list[re.Match[str]], value: float) -> bool:

@@ -42,6 +42,7 @@ from hil.twin.mechanisms import (
     table_side_friction,
     table_side_viscous_friction,
     thermal_growth,
+    torque_constant_gradient,
     torque_constant_saturation,
     torque_dead_zone,
     torque_ripple,
@@ -57,6 +58,7 @@ LIBRARY: tuple[Mechanism, ...] = (
     torque_saturation.MECHANISM,
     current_loop_lag.MECHANISM,
     torque_constant_saturation.MECHANISM,  # K(angle, current) is the product: the ripple does not saturate it
+    torque_constant_gradient.MECHANISM,
     torque_ripple.MECHANISM,
     cogging_torque.MECHANISM,
     constant_load.MECHANISM,

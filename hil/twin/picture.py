@@ -17,6 +17,7 @@ class Picture(StrEnum):
     FORCE_OVER_TIME = "force on the table within its period"
     COGGING = "torque over motor angle within its period"
     RIPPLE = "torque per ampere over motor angle within its period"
+    CONSTANT_OVER_TRAVEL = "torque per ampere over position"
     LEAD_OVER_TURN = "lead error within a turn"
     LEAD_OVER_TRAVEL = "lead error over position"
     GROWTH = "growth of the lead over time"

@@ -186,6 +186,13 @@ LAWS: dict[Picture, DrawnLaw] = {
         carrier=lambda d, view: view.run.torque,
         period=_per_order,
     ),
+    Picture.CONSTANT_OVER_TRAVEL: DrawnLaw(
+        WAY,
+        lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
+        "torque per ampere, change",
+        "1",
+        carrier=lambda d, view: view.run.torque,
+    ),
     Picture.LEAD_OVER_TURN: DrawnLaw(
         ANGLE,
         lambda term, d, x: _metres(d) * _at(term, d, angle_rad=x),

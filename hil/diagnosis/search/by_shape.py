@@ -13,6 +13,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from hil.diagnosis.criteria import CRITERIA
+from hil.diagnosis.search.harmonics import combined, is_scaled, pairs, spanning
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.shape import Size, log_chance_below_noise, log_chance_of_shape, prepare, sizes
@@ -96,56 +97,26 @@ def _median_step(data: Dataset) -> float:
 
 def _place(term: Term) -> tuple[object, ...]:
     """Variant, windows and values of a start, without strength and phase if least squares tell these."""
-    if not _is_scaled(term):
+    if not is_scaled(term):
         return term.variant, term.values
-    apart = {index for pair in _pairs(term) for index in pair}
+    apart = {index for pair in pairs(term) for index in pair}
     return term.variant, tuple(value for index, value in enumerate(term.values) if index not in apart), term.windows
-
-
-def _is_scaled(term: Term) -> bool:
-    mechanism = BY_ID[term.effect]
-    return mechanism.search.proportional and mechanism.variants[term.variant].proportional
-
-
-def _pairs(term: Term) -> list[tuple[int, ...]]:
-    """Indices of strength and phase of each harmonic; of the strength alone without phases."""
-    mechanism = BY_ID[term.effect]
-    phases, strength = mechanism.indices(Role.PHASE), mechanism.strength
-    return [(strength + 2 * n, phases[0] + 2 * n) for n in range(len(phases))] or [(strength,)]
-
-
-def _spans(term: Term) -> list[Term]:
-    """Terms that span the effect of a term: itself, or sine and cosine of each harmonic at the first strength."""
-    pairs, found = _pairs(term), []
-    if len(pairs[0]) == 1:
-        return [term]
-    for strength, phase in pairs:
-        for angle in (0.0, 0.5 * math.pi):
-            values = list(term.values)
-            for other, _ in pairs:
-                values[other] = 0.0
-            values[strength], values[phase] = term.values[pairs[0][0]], angle
-            found.append(replace(term, values=tuple(values)))
-    return found
 
 
 def _scaled(base: Fit, term: Term) -> Term | None:
     """The term with the strengths and phases that least squares tell; None if it has none that are allowed."""
-    if not _is_scaled(term):
+    if not is_scaled(term):
         return term
-    seen = sizes([base.hypothesis.with_term(one) for one in _spans(term)], base)
+    seen = sizes([base.hypothesis.with_term(one) for one in spanning(term)], base)
     if not seen:
         return None
-    told = [one.told.value for one in min(seen, key=_least)]
-    values, unit, parameters = list(term.values), term.values[_pairs(term)[0][0]], BY_ID[term.effect].parameters
-    for n, (strength, *phase) in enumerate(_pairs(term)):
-        size = told[n]
-        if phase:
-            size, values[phase[0]] = math.hypot(*told[2 * n : 2 * n + 2]), math.atan2(told[2 * n + 1], told[2 * n])
-        if not unit * size >= parameters[strength].low:
+    told = combined(term, [one.told.value for one in min(seen, key=_least)])
+    values, parameters = list(told.values), BY_ID[term.effect].parameters
+    for strength, *_ in pairs(term):
+        if not values[strength] >= parameters[strength].low:
             return None
-        values[strength] = min(unit * size, parameters[strength].high)
-    return replace(term, values=tuple(values))
+        values[strength] = min(values[strength], parameters[strength].high)
+    return replace(told, values=tuple(values))
 
 
 def _least(own: Sequence[Size]) -> float:

@@ -9,7 +9,7 @@ started at strengths with the same torque at creep, where all torque is Coulomb 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,28 +24,6 @@ from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Block, Mechanism, Variant
 from hil.twin.parameter import Dimension, Role
 from hil.twin.scene import Scene
-
-
-@dataclass(frozen=True)
-class StartPoint:
-    """Parameter values of one variant, and the indices of strength and phase (-1: no phase).
-
-    There are `harmonics` consecutive pairs of strength and phase. With `instead`, the start replaces another variant of
-    a mechanism of the bench.
-    """
-
-    effect: str
-    variant: int
-    values: tuple[float, ...]
-    strength: int = 0
-    phase: int = -1
-    harmonics: int = 1
-    instead: bool = False
-    windows: tuple[Window, ...] = ()
-
-    def term(self, values: tuple[float, ...] | None = None) -> Term:
-        """The term of the start, at other values if given."""
-        return Term(self.effect, self.variant, self.values if values is None else values, windows=self.windows)
 
 
 def scene(
@@ -126,27 +104,19 @@ _SHORTEST_M = 1e-3  # shortest period of friction along the travel: shorter ones
 _WHOLE = 0.05  # largest deviation of lead / period from a whole order of the screw
 
 
-def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[StartPoint]:
+def starts(scene: Scene, bench: Bench, runs: Sequence[Measured] = ()) -> list[Term]:
     """Starting points of all variants of the library for a scene; an event is in the longest of the runs, or in all."""
     longest = max(runs, key=lambda run: run.motor.size, default=None)
     somewhere = [tuple(Window(run.name) for run in chosen) for chosen in ([longest] if longest else [], runs)]
-    points = []
-    for mechanism in LIBRARY:
-        if mechanism.turning and not bench.axis.turns:
-            continue
-        phases = mechanism.indices(Role.PHASE)
-        for number, variant in enumerate(mechanism.variants):
-            if not observable(mechanism, variant, bench):
-                continue
-            strength, phase = mechanism.strength, next(iter(phases), -1)
-            if not (mechanism.search.proportional and variant.proportional):
-                strength = phase = -1
-            points += [
-                StartPoint(mechanism.id, number, point, strength, phase, max(len(phases), 1), windows=windows)
-                for point in mechanism.start_points(number, scene)
-                for windows in (dict.fromkeys(somewhere) if mechanism.transient else [()])
-            ]
-    return points
+    return [
+        Term(mechanism.id, number, point, windows=windows)
+        for mechanism in LIBRARY
+        if bench.axis.turns or not mechanism.turning
+        for number, variant in enumerate(mechanism.variants)
+        if observable(mechanism, variant, bench)
+        for point in mechanism.start_points(number, scene)
+        for windows in (dict.fromkeys(somewhere) if mechanism.transient else [()])
+    ]
 
 
 # The angle is unknown, since the zero of the table is not that of the motor: eight phases are within 23 deg of any.

@@ -19,7 +19,8 @@ from hil.arrays import FloatArray
 from hil.diagnosis.search.event_detection import detect
 from hil.diagnosis.search.events import EVENTS, event_term, information_criterion
 from hil.diagnosis.search.force_windows import torque_windows
-from hil.diagnosis.search.initial_values import StartPoint, claimable, scene, starts
+from hil.diagnosis.search.harmonics import combined, is_scaled, pairs, spanning
+from hil.diagnosis.search.initial_values import claimable, scene, starts
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import correlation_time, whitened, whitening
@@ -115,11 +116,8 @@ def screen_library(base: Fit) -> list[Candidate]:
     lacking = lacking_torque(hypothesis, base.data) if base.within_noise else ()
     blocks = hypothesis.residuals(base.data).channels
     known = scene(base.data.runs, base.bench, blocks, base.data.observer_s, lacking)
-    points = [
-        _beside_known(start, hypothesis)
-        for start in (*starts(known, hypothesis.bench, base.data.runs), *_events(base))
-        if offered(start.term(), hypothesis, terms)
-    ]
+    every = (*starts(known, hypothesis.bench, base.data.runs), *_events(base))
+    points = [start for start in every if offered(start, hypothesis, terms)]
     best: dict[str, list[Candidate]] = {}
     views = [_view(base, False), _view(base, True)]
     for candidate in screen(base, points, views):
@@ -143,7 +141,7 @@ def screen_library(base: Fit) -> list[Candidate]:
     return sorted((one for one in candidates if one is not None), key=lambda one: -one.score)
 
 
-def _events(base: Fit) -> list[StartPoint]:
+def _events(base: Fit) -> list[Term]:
     """The starts of all events that the disturbance torque shows, and of those that least squares tell, as terms."""
     if any(term.windows for term in base.terms):
         return []
@@ -154,11 +152,7 @@ def _events(base: Fit) -> list[StartPoint]:
     terms = [term for _, term in sorted(pairs, key=lambda pair: information_criterion(*pair))[:1]]
     told = torque_windows(base, base.data)
     terms += [event_term(effect, told, ratio) for effect in EVENTS if told]
-    return [
-        StartPoint(term.effect, 0, term.values, BY_ID[term.effect].strength, windows=term.windows)
-        for term in terms
-        if offered(term, base.hypothesis, base.terms)
-    ]
+    return [term for term in terms if offered(term, base.hypothesis, base.terms)]
 
 
 def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
@@ -171,13 +165,6 @@ def offered(new: Term, hypothesis: Hypothesis, terms: Sequence[Term]) -> bool:
     if fitted and any(repeats(new, other) and new.variant == other.variant for other in known):
         return False
     return compatible((*terms, new, *(other for other in known if not repeats(new, other))))
-
-
-def _beside_known(start: StartPoint, hypothesis: Hypothesis) -> StartPoint:
-    """Mark a start that replaces a mechanism of the bench."""
-    new = start.term()
-    replaces = start.strength >= 0 and any(repeats(new, entry.active()) for entry in hypothesis.kept)
-    return replace(start, instead=replaces)
 
 
 def _nearest_first(same: Sequence[Candidate]) -> list[Candidate]:
@@ -201,12 +188,12 @@ def _tuned(base: Fit, best: Candidate, views: Sequence[_View]) -> Candidate:
             for factor in (step, 1.0 / step):
                 values = list(best.term.values)
                 values[index] = min(max(factor * values[index], parameter.low), parameter.high)
-                points.append(StartPoint(mechanism.id, variant, tuple(values), strength=-1))
+                points.append(Term(mechanism.id, variant, tuple(values)))
         best = max(best, screen(base, points, views)[0], key=lambda one: one.score)
     return best
 
 
-def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ()) -> list[Candidate]:
+def screen(base: Fit, points: Sequence[Term], views: Sequence[_View] = ()) -> list[Candidate]:
     """Score each start, best first; `views` of the base are made if not given.
 
     The score is the larger of two, as in `inference.bic_gain`: on plain residuals with their independent rows,
@@ -215,39 +202,34 @@ def screen(base: Fit, points: Sequence[StartPoint], views: Sequence[_View] = ())
     views, search = views or [_view(base, False), _view(base, True)], replace(base.estimator, fast=True)
     unchanged = search.residuals(base.hypothesis).vector
 
-    def direction(start: StartPoint, values: tuple[float, ...]) -> FloatArray:
-        changed = base.hypothesis.with_term(start.term(values))
-        return search.residuals(changed).vector - unchanged
+    def direction(term: Term) -> FloatArray:
+        return search.residuals(base.hypothesis.with_term(term)).vector - unchanged
 
-    def candidate(start: StartPoint) -> Candidate:
-        directions = [direction(start, values) for values in _directions(start)]
-        gone = direction(start, _scaled(start, np.zeros(2 * start.harmonics))) if start.instead else np.zeros(base.rows)
+    def candidate(start: Term) -> Candidate:
+        directions = [direction(term) for term in spanning(start)]
+        instead = is_scaled(start) and any(repeats(start, entry.active()) for entry in base.hypothesis.kept)
+        nothing = _within(combined(start, np.zeros(len(directions))), start)
+        gone = direction(nothing) if instead else np.zeros(base.rows)
         found = [scored(start, directions, gone, view) for view in views]
         best = max(found, key=lambda one: max(one.by_channel.values()))  # of what it explains most it tells its size
         score, own = (max(values) for values in zip(*((one.score, one.own) for one in found), strict=True))
         return replace(best, score=score, own=own, by_channel=_most(one.by_channel for one in found))
 
-    def scored(start: StartPoint, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
-        without = view.residual + view.of(gone) if start.instead else view.residual
+    def scored(start: Term, directions: list[FloatArray], gone: FloatArray, view: _View) -> Candidate:
+        without = view.residual + view.of(gone) if gone.any() else view.residual
         span = np.stack([view.of(change - gone) for change in directions], axis=1)
         products, target = span.T @ span, -(span.T @ without)
         coefficients = np.asarray(np.linalg.pinv(products, hermitian=True) @ target, dtype=np.float64)
         left = without + span @ coefficients
         score, by_channel = view.evidence(left), view.explained(left)
-        if start.strength < 0:
-            # a start that cannot be scaled is also scored at its own strength
+        if not is_scaled(start):  # also scored at its own strength
             there = without + span[:, 0]
             own, at_own = view.evidence(there), view.explained(there)
             if coefficients[0] <= 0.0:
                 score, by_channel = 0.0, at_own
-            return Candidate(start.term(), max(score, own), own=own, by_channel=_most([by_channel, at_own]))
-        return Candidate(
-            start.term(_scaled(start, coefficients)),
-            score,
-            tuple(start.term(_scaled(start, factor * coefficients)) for factor in _WEAKER),
-            score,
-            by_channel,
-        )
+            return Candidate(start, max(score, own), own=own, by_channel=_most([by_channel, at_own]))
+        scaled, *weaker = (_within(combined(start, factor * coefficients), start) for factor in (1.0, *_WEAKER))
+        return Candidate(scaled, score, tuple(weaker), score, by_channel)
 
     return sorted(POOL.map(candidate, points), key=lambda one: -one.score)
 
@@ -261,40 +243,14 @@ def _most(shares: Iterable[Mapping[str, float]]) -> dict[str, float]:
     return found
 
 
-def _pairs(start: StartPoint) -> list[tuple[int, int]]:
-    """Indices of strength and phase of each harmonic."""
-    return [(start.strength + 2 * n, start.phase + 2 * n) for n in range(start.harmonics)]
-
-
-def _directions(start: StartPoint) -> list[tuple[float, ...]]:
-    """Parameter values that span the effect of a start: its strength, or sine and cosine of each harmonic."""
-    if start.phase < 0:
-        return [start.values]
-    points = []
-    for strength, phase in _pairs(start):
-        for angle in (0.0, np.pi / 2.0):
-            values = list(start.values)
-            for other, _ in _pairs(start):
-                values[other] = 0.0
-            values[strength], values[phase] = start.values[start.strength], angle
-            points.append(tuple(values))
-    return points
-
-
-def _scaled(start: StartPoint, coefficients: FloatArray) -> tuple[float, ...]:
-    """Values of the start at the strengths and phases of the score test, within bounds."""
-    values = list(start.values)
-    unit = start.values[start.strength]
-    for n, (strength, phase) in enumerate(_pairs(start)):
-        parameter = BY_ID[start.effect].parameters[strength]
-        factor = float(coefficients[0])
-        if start.phase >= 0:
-            sine, cosine = coefficients[2 * n : 2 * n + 2]
-            factor, values[phase] = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
-        wanted, smallest = unit * factor, abs(unit) * 1e-3
+def _within(term: Term, start: Term) -> Term:
+    """The term with strengths within bounds, and not below a thousandth of that of its start."""
+    values, smallest = list(term.values), 1e-3 * abs(start.values[pairs(start)[0][0]])
+    for strength, *_ in pairs(term):
+        parameter, wanted = BY_ID[term.effect].parameters[strength], values[strength]
         if parameter.low >= 0.0:
             wanted = max(wanted, smallest)
         elif abs(wanted) < smallest:
             wanted = smallest
         values[strength] = min(max(wanted, parameter.low), parameter.high)
-    return tuple(values)
+    return replace(term, values=tuple(values))

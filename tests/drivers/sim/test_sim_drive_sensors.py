@@ -28,6 +28,14 @@ def test_torque_ripple_is_unseen_by_the_current() -> None:
     assert current == 2.0
 
 
+def test_torque_constant_is_straight_along_the_travel() -> None:
+    effect = Effect("torque_constant_gradient", {"slope_1_m": -2.0})
+    for x, share in ((0.1, 0.8), (-0.1, 1.2), (0.0, 1.0), (0.6, 0.0)):
+        torque, current = torque_and_current(effect, 3.0, x / R)
+        assert torque == pytest.approx(3.0 * share, rel=1e-9, abs=1e-12)
+        assert current == 3.0
+
+
 def test_torque_constant_falls_with_current() -> None:
     effect = Effect("torque_constant_saturation", {"coefficient_1_n2_m2": 0.002})
     for command in (5.0, -5.0):

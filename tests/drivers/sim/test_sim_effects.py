@@ -36,6 +36,7 @@ SHOWN = {
     "structural_mode": {"frequency_hz": 45.0, "damping_ratio": 0.03},
     "cogging_torque": {"amplitude_n_m": 0.1, "cycles_per_rev": 10, "phase_rad": 0.5},
     "torque_ripple": {"fraction": 0.05, "cycles_per_rev": 6},
+    "torque_constant_gradient": {"slope_1_m": -2.0},
     "torque_constant_saturation": {"coefficient_1_n2_m2": 2e-3},
     "torque_saturation": {"limit_n_m": 2.0},
     "torque_dead_zone": {"half_width_n_m": 0.1},
@@ -71,7 +72,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 36
+    assert len(CATALOGUE) == 37
 
 
 @pytest.mark.parametrize("name", SHOWN)

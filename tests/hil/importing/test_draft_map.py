@@ -229,6 +229,7 @@ def test_uneven_stamps_are_interpolated_and_said(tmp_path: Path) -> None:
         lambda c: [{k: float(v[i]) for k, v in c.items()} for i in range(len(AXIS["t"]))],
         lambda c: {"columns": list(c), "data": np.column_stack(list(c.values())).tolist()},
         lambda c: [{"name": k, "values": v.tolist()} for k, v in c.items()],
+        lambda c: {"rig": "arm 2", "signals": {k: {"data": v.tolist()} for k, v in c.items()}},
     ],
 )
 def test_json_in_the_forms_that_tools_write(tmp_path: Path, content: Any) -> None:

@@ -51,6 +51,17 @@ AXIS = axis()
         ("100% corresponds to 12 N", Constant.RATED_FORCE, 12.0),
         ("kt = 0.22", Constant.TORQUE, 0.22),
         ("Motor rated torque;3,5", Constant.RATED_TORQUE, 3.5),
+        ("Z axis, ball screw with 10 mm pitch directly coupled to the motor", Constant.LEAD, 0.01),
+        ("roller screw 4 mm lead, motor coaxial with the screw.", Constant.LEAD, 0.004),
+        ("Spindel mit 5 mm Steigung", Constant.LEAD, 0.005),
+        ("pulley 160 mm per turn -> 32 mm feed per motor revolution", Constant.LEAD, 0.032),
+        (
+            "belt 2:1 - ball screw 20 mm lead -> 10 mm travel of the ram per motor turn. Stroke 0...120 mm",
+            Constant.LEAD,
+            0.01,
+        ),
+        ("Vorschub 12 mm je Motorumdrehung", Constant.LEAD, 0.012),
+        ("Motor 8 Nm Nennmoment", Constant.RATED_TORQUE, 8.0),
         ("TS = 90 [usec] ; RG = 8 ; interval = TS * RG", Constant.RATE, 1.0 / 720e-6),
     ],
 )
@@ -65,6 +76,9 @@ def test_a_line_gives_a_constant_in_si(line: str, constant: Constant, value: flo
     [
         "Fecha;12/03/2026",
         "pole pitch 24 mm",
+        "magnet track with 32 mm pitch",
+        "a screw of 5 mm lead error",
+        "pinion 235.6 mm per pinion turn",
         "voltage constant 0.8 Nm/A",
         "rated torque 0x6076",
         "Sampling interval [ms];1;2;2",

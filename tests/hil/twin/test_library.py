@@ -44,6 +44,7 @@ TABLE = {
     "structural_mode": ("table", ["frequency_hz", "damping_ratio"]),
     "cogging_torque": ("motor_side", ["amplitude_n_m", "cycles_per_rev", "phase_rad"]),
     "torque_ripple": ("drive", ["fraction", "cycles_per_rev"]),
+    "torque_constant_gradient": ("drive", ["slope_1_m"]),
     "torque_constant_saturation": ("drive", ["coefficient_1_n2_m2"]),
     "torque_saturation": ("drive", ["limit_n_m"]),
     "torque_dead_zone": ("drive", ["half_width_n_m"]),

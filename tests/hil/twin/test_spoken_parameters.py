@@ -28,6 +28,7 @@ def test_a_spoken_name_has_no_unit_and_is_its_own(mechanism) -> None:
         ("torque_constant_saturation", ["coefficient"]),
         ("cumulative_lead_error", ["slope"]),
         ("friction_gradient", ["slope"]),
+        ("torque_constant_gradient", ["slope"]),
         ("end_stop", ["stiffness", "edge"]),
     ],
 )

@@ -21,6 +21,7 @@ from hil.twin.mechanisms import (
     local_friction,
     nonlinear_viscous_friction,
     stribeck_friction,
+    torque_constant_gradient,
     torque_constant_saturation,
     torque_ripple,
 )
@@ -158,6 +159,13 @@ def _rippling(half: Half, rng: Rng) -> Edit | None:
     )
 
 
+def _along_the_travel(half: Half, rng: Rng) -> Edit | None:
+    torque, at = half.torque, half.position_m
+    largest = 0.3 / max(float(np.max(np.abs(at))), 1e-300)
+    mechanism = torque_constant_gradient.MECHANISM
+    return Edit(EditedChannel.TORQUE, lambda a: torque / (1.0 + a * at), largest, mechanism, told=(0,), signed=True)
+
+
 def _saturating(half: Half, rng: Rng) -> Edit:
     torque, largest = half.torque, _SATURATED / _peak(half) ** 2 / 2.0
     return Edit(
@@ -213,6 +221,7 @@ TORQUE_EDITS: Mapping[str, Drawn] = {
     "force in windows": _windows(3),
     "torque over the angle": _cogging,
     "torque constant over the angle": _rippling,
+    "torque constant over the travel": _along_the_travel,
     "torque constant over current": _saturating,
     "current compressed": _compressed,
     "friction by load": _by_load,

@@ -15,7 +15,7 @@ import numpy as np
 
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
-from hil.diagnosis.search.initial_values import StartPoint, starts
+from hil.diagnosis.search.harmonics import is_scaled, pairs
 from hil.diagnosis.search.score_test import Candidate, screen_library
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
@@ -30,8 +30,7 @@ SIGNIFICANT = 2.0  # standard errors
 
 def fit_everything(case: PeerCase, evaluations: int = EVALUATIONS) -> dict[str, Any]:
     """Return the answer of one fit of everything to a case."""
-    begun = {start.effect: start for start in starts(case.scene, case.bench)}
-    terms = tuple(_weak(one, begun[one.term.effect]) for one in screen_library(case.nominal))
+    terms = tuple(_weak(one) for one in screen_library(case.nominal))
     hypothesis: Hypothesis = reduce(Hypothesis.with_term, terms, case.nominal.hypothesis)
     found = case.nominal.estimator.fit(hypothesis, evaluations=evaluations)
     significant = [
@@ -47,12 +46,11 @@ def fit_everything(case: PeerCase, evaluations: int = EVALUATIONS) -> dict[str, 
     return case.answer([terms[index].effect for index in named])
 
 
-def _weak(candidate: Candidate, start: StartPoint) -> Term:
+def _weak(candidate: Candidate) -> Term:
     """Return a candidate's term with its strength reduced to the share that it explains."""
     values = list(candidate.term.values)
-    if start.strength >= 0:
-        for n in range(start.harmonics):
-            values[start.strength + 2 * n] *= max(0.01, *candidate.by_channel.values())
+    for strength, *_ in pairs(candidate.term) if is_scaled(candidate.term) else ():
+        values[strength] *= max(0.01, *candidate.by_channel.values())
     return replace(candidate.term, values=tuple(values))
 
 

@@ -164,10 +164,12 @@ def nut_force(p: Any, stiffness: float, stretch: float, rate: float) -> tuple[fl
 @njit(cache=True)
 def lead_error(p: Any, coordinate_m: float, time_s: float) -> tuple[float, float]:
     """Error e [m] of the transmission table = r theta + e(theta), and its slope de / d(r theta)."""
-    slope = p.cumulative_lead_error.slope_m_m
+    slope, offset = p.cumulative_lead_error.slope_m_m, 0.0
     if p.thermal_growth.on:
-        slope += p.thermal_growth.relative_growth * (1.0 - exp(-time_s / p.thermal_growth.time_constant_s))
-    error = slope * coordinate_m
+        grown = p.thermal_growth.relative_growth * (1.0 - exp(-time_s / p.thermal_growth.time_constant_s))
+        slope += grown
+        offset = grown * p.thermal_growth.bearing_m
+    error = slope * coordinate_m - offset
     if p.periodic_lead_error.on:
         e = p.periodic_lead_error
         angle = coordinate_m / p.screw_ratio

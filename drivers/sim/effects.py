@@ -108,8 +108,8 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
          "amplitude_3_m": _OFF, "phase_3_rad": _OFF}),
     "cumulative_lead_error": Definition("table = r theta (1 + slope)", {"slope_m_m": _ANY}),
     "thermal_growth": Definition(
-        "table = r theta (1 + relative_growth (1 - exp(-t / time_constant)))",
-        {"relative_growth": _ANY, "time_constant_s": _POSITIVE}),
+        "table = r theta + relative_growth (1 - exp(-t / time_constant)) (r theta - bearing)",
+        {"relative_growth": _ANY, "time_constant_s": _POSITIVE, "bearing_m": _OFF}),
     # drive
     "torque_ripple": Definition(
         "torque times 1 + fraction sin(cycles theta + phase), unseen by the current",

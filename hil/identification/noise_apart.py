@@ -5,14 +5,14 @@
     r(theta) = e(theta; .) + [e(theta0; measured) - e(theta0; .)]                 other channels, as the motor
     r(theta) = e(theta0; measured)                                                rows that do not slide
 
-e: residuals block by block; theta0: a reference; J: inertia. Quiet is a recording with a motion without the noise of
-its encoder, smooth has the torque that the plain model needs for that motion, and left this with what the plain model
-leaves of the measured torque. The noise of a torque drives a twin, and least squares of e(theta; measured) prefers an
-axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical Adjustment of
-Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for every hypothesis.
-A resonance would pass less of it: there it goes through the reference alone. So a fit is least squares of the torque;
-w whitens it by the autoregressive model of what the plain model leaves, so that slow errors do not hide a faster
-effect. About a reversal smoothed motion tells nothing.
+e: residuals block by block; theta0: a reference; J: inertia. Smooth is a recording with a motion without the noise of
+its encoder and the torque that the plain model needs for it; quiet and left have that torque and what the plain model
+leaves of the measured one, both of the same smoothed motion and torque. The noise of a torque drives a twin, and least
+squares of e(theta; measured) prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables;
+W. E. Deming, Statistical Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks,
+with the same noise for every hypothesis. A resonance would pass less of it: there it goes through the reference alone.
+So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain model leaves, so
+that slow errors do not hide a faster effect. About a reversal smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
@@ -44,15 +44,18 @@ def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Data
 
 
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel, smoothed: bool) -> NoiseApart:
-    moved, rows = measured_motion(run if smoothed else intended(run)).moved, measured_motion(run).sliding(plain.slowest)
+    own = measured_motion(run)
+    moved, rows = own.moved if smoothed else measured_motion(intended(run)).moved, own.sliding(plain.slowest)
     needed, taps, gain = np.where(rows, plain.predict(moved), run.torque), np.ones(1), 1.0
-    smooth = replace(run, motor=moved.position, torque=needed, torque_command=needed)
+    # torque and motion through the same mean: what it takes off a motion alone is a torque that every twin lacks
+    left = np.where(rows, own.torque - plain.predict(own.moved), 0.0)
+    smooth = _driven(replace(run, motor=moved.position), needed)
     measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
     noise = {name: measured[name] - free[name] for name in measured}
     if rows.any():
-        taps, left = _whitened(run, moved, needed, rows, plain, run.period_s / data.observer_s)
+        taps, own_left = _whitened(run, moved, left, rows, plain, run.period_s / data.observer_s)
         elastic = bool(reference.bench.axis.SPRINGS)
-        driven = replace(smooth, torque=left, torque_command=left) if elastic else _driven(smooth, run)
+        driven = _driven(smooth, needed + (own_left if elastic else left))
         seen = reference.blocks(driven, data.observer_s, rests=run)
         if not elastic:
             smooth, free, noise = driven, seen, {name: measured[name] - seen[name] for name in measured}
@@ -61,25 +64,25 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     return NoiseApart(smooth, rows, noise, measured, inertia(reference.resolved.bench), taps, gain)
 
 
-def _driven(smooth: Measured, run: Measured) -> Measured:
-    """The smooth motion with the measured torque."""
-    return replace(smooth, torque=run.torque, torque_command=run.torque)
+def _driven(run: Measured, torque: FloatArray) -> Measured:
+    """The run with another torque (n,)."""
+    return replace(run, torque=torque, torque_command=torque)
 
 
 def _whitened(
-    run: Measured, moved: MeasuredMotion, needed: FloatArray, rows: NDArray[np.bool_], plain: PlainModel, a: float
+    run: Measured, moved: MeasuredMotion, left: FloatArray, rows: NDArray[np.bool_], plain: PlainModel, a: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Filter (k,) that whitens what the plain model leaves behind the observer, and a torque (n,) of model and rest.
+    """Filter (k,) that whitens what the plain model leaves of each row behind the observer, and what it leaves (n,).
 
-    The rest is that of generalised least squares, so that it does not bend the parameters of the plain model.
+    The latter by generalised least squares, so that it does not bend the parameters of the plain model.
     """
-    beyond = run.torque - needed
+    raw = np.where(rows, run.torque - plain.predict(measured_motion(run).moved), 0.0)
     columns = np.column_stack([*plain_columns(later_motion(moved, plain.early_rows)).values()])
-    seen = np.column_stack([observed(one, a)[rows] for one in (beyond, *columns.T)])
-    taps = whitening_filter(seen[:, 0], seen[:, 1:], [rows])
-    white = np.column_stack([filtered(one, [rows], taps) for one in seen.T])
+    of_rows, *seen = (observed(one, a)[rows] for one in (raw, left, *columns.T))
+    taps = whitening_filter(of_rows, np.column_stack(seen[1:]), [rows])
+    white = np.column_stack([filtered(one, [rows], taps) for one in seen])
     again = columns @ np.linalg.lstsq(white[:, 1:], white[:, 0], RANK)[0]
-    return taps, needed + np.where(rows, beyond - again, 0.0)
+    return taps, np.where(rows, left - again, 0.0)
 
 
 def smoothed_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:
@@ -95,4 +98,4 @@ def intended_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured
 def _smoothed(run: Measured, moves: Measured, plain: PlainModel) -> Measured:
     moved = measured_motion(moves).moved
     torque = np.where(measured_motion(run).sliding(plain.slowest), plain.predict(moved), run.torque)
-    return replace(run, motor=moved.position, torque=torque, torque_command=torque)
+    return _driven(replace(run, motor=moved.position), torque)

@@ -128,6 +128,19 @@ def _ratio(diagnosis: Diagnosis, view: View) -> FloatArray:
     return np.full(view.run.motor.size, diagnosis.given_bench.axis.ratio_m_rad)
 
 
+def _per_metre(term: Term, diagnosis: Diagnosis, time_s: FloatArray) -> FloatArray:
+    """Growth (n,) of a metre of the screw at times (n,)."""
+    ends = (_at(term, diagnosis, time_s=time_s, table_m=np.array(place)) for place in (1.0, 0.0))
+    return np.asarray(np.subtract(*ends))
+
+
+def _from_bearing(diagnosis: Diagnosis, view: View) -> FloatArray:
+    """Distance (n,) from the place that does not move."""
+    last_s = np.asarray(view.run.time_s[-1:])
+    still = _at(view.term, diagnosis, time_s=last_s, table_m=np.array(0.0)) / _per_metre(view.term, diagnosis, last_s)
+    return _position(diagnosis, view) + float(still[0])
+
+
 def _in_proportion(diagnosis: Diagnosis, view: View) -> FloatArray:
     """What the twin makes of one unit of the law (n,): the part that the term models, over the law."""
     before, after = view.residuals("table")
@@ -205,11 +218,11 @@ LAWS: dict[Picture, DrawnLaw] = {
     ),
     Picture.GROWTH: DrawnLaw(
         TIME,
-        lambda term, d, x: _metres(d) * _at(term, d, time_s=x, table_m=np.array(1.0)),
+        lambda term, d, x: _metres(d) * _per_metre(term, d, x),
         "growth of the screw",
         "m/m",
         channel=_table,
-        carrier=_position,
+        carrier=_from_bearing,
     ),
     Picture.MOTOR_READING: DrawnLaw(
         ANGLE,

@@ -116,6 +116,8 @@ def sizes(found: Sequence[Hypothesis], without: Fit, fast: bool = True) -> list[
         after = [left_in_channel(one, of.calm, of.channel, plain, fast) for one, _ in faint]
         clear = [np.logical_and.reduce([one.clear for one in run]) for run in zip(*after, strict=True)]
         for own in of.seen:
+            if own.smoothed and any(BY_ID[term.effect].shifts_phase for terms in added for term in terms):
+                continue
             rows = [at & one for at, one in zip(own.rows, clear, strict=True)]
             counted = np.concatenate([one[at] for at, one in zip(own.rows, clear, strict=True)])
             shapes = [own.quiet[counted] - _joined(one, rows) for one in after]
@@ -167,7 +169,8 @@ class _Seen(NamedTuple):
     """Residuals (m,) of a channel on the rows that slide: `measured`, and `quiet` of the calm motion.
 
     Rows in which the twin sticks are left out. `beside` (m, q) has the columns of least squares beside a shape,
-    `constant` (q,) marks the offsets among them.
+    `constant` (q,) marks the offsets among them. `smoothed`: of a motion through a mean, which is itself a lag or a
+    resonance, so that it tells none.
     """
 
     rows: list[NDArray[np.bool_]]
@@ -175,6 +178,7 @@ class _Seen(NamedTuple):
     quiet: FloatArray
     beside: FloatArray
     constant: NDArray[np.bool_]
+    smoothed: bool
 
 
 class _Asked(NamedTuple):
@@ -206,7 +210,7 @@ def _asked(without: Fit, fast: bool) -> tuple[PlainModel | None, list[_Asked]]:
         others = [left_in_channel(one, calm, channel, plain, fast) for one in _other_values(without)]
         least = least_energy(data, channel, plain) * (1.0 if channel == TORQUE else CRITERIA.material)
         seen = [
-            _seen(parts, quiet, others, _motions(data, channel, held is smooth))
+            _seen(parts, quiet, others, _motions(data, channel, held is smooth), held is smooth)
             for held in ((data, smooth) if channel == TORQUE else (data,))
             for parts in [left_in_channel(without.hypothesis, held, channel, plain, fast)]
         ]
@@ -234,6 +238,7 @@ def _seen(
     quiet: Sequence[ResidualSeries],
     others: Sequence[Sequence[ResidualSeries]],
     motions: Sequence[Sequence[MeasuredMotion]],
+    smoothed: bool,
 ) -> _Seen | None:
     """Residuals of a channel and of its calm motion; None where too few rows slide, or the twin holds no motion."""
     rows = [one.rows & one.clear & other.clear for one, other in zip(parts, quiet, strict=True)]
@@ -243,7 +248,7 @@ def _seen(
     beside = [np.ones_like(measured), *(column for moved in motions for column in _of_motion(moved, rows))]
     changed = (_joined(one, rows) - own for one in others)
     columns = np.column_stack([*beside, *(change for change in changed if _holds(change))])
-    return _Seen(rows, measured, own, columns, np.ptp(columns, axis=0) == 0.0)
+    return _Seen(rows, measured, own, columns, np.ptp(columns, axis=0) == 0.0, smoothed)
 
 
 def _of_motion(moved: Sequence[MeasuredMotion], rows: Sequence[NDArray[np.bool_]]) -> list[FloatArray]:

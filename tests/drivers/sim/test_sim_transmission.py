@@ -125,12 +125,13 @@ def test_cumulative_lead_error_grows_along_the_travel() -> None:
     assert plant.table_true_m - x == pytest.approx(8e-5 * x, rel=1e-3)
 
 
-def test_thermal_growth_scales_travel_with_time() -> None:
-    effect = Effect("thermal_growth", {"relative_growth": 1e-4, "time_constant_s": 3.0})
+@pytest.mark.parametrize("bearing_m", [0.0, -0.3])
+def test_thermal_growth_scales_the_way_from_the_bearing_with_time(bearing_m: float) -> None:
+    effect = Effect("thermal_growth", {"relative_growth": 1e-4, "time_constant_s": 3.0, "bearing_m": bearing_m})
     plant = coasting(effect, speed_m_s=0.1)
     plant.advance(0.0, 2.5)
     x = R * plant.motor_true_rad
-    assert plant.table_true_m - x == pytest.approx(1e-4 * (1 - np.exp(-1)) * x, rel=5e-3)
+    assert plant.table_true_m - x == pytest.approx(1e-4 * (1 - np.exp(-1)) * (x - bearing_m), rel=5e-3)
 
 
 @pytest.mark.parametrize("form", ["attached", "base"])

@@ -40,11 +40,11 @@ def test_a_sentence_rounds_its_values_by_their_errors() -> None:
 
 def test_a_growth_that_goes_on_beyond_the_recording_is_told_by_its_rate() -> None:
     """0.0149 % within 662 s, +-0.33 % and +-14984 s, in a recording of 58 s: only the rate is known."""
-    told = said("thermal_growth", (1.49e-4, 662.0), (3.3e-3, 14984.0), strength=1.5e-5)
+    told = said("thermal_growth", (1.49e-4, 662.0), (3.3e-3, 14984.0, 0.1), strength=1.5e-5)
     assert told == (
         "The screw grows by 0.0014 % of its length per minute while it is recorded; where it ends is not told."
     )
-    whole = said("thermal_growth", (1.49e-4, 20.0), (1e-6, 0.5))
+    whole = said("thermal_growth", (1.49e-4, 20.0), (1e-6, 0.5, 0.1))
     assert whole == "The screw grows by 0.0149 % of its length as it warms up, within about 20.0 s."
 
 

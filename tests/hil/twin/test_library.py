@@ -77,7 +77,7 @@ NEUTRAL = {
         "amplitude_3_m": 0.0,
         "phase_3_rad": 0.0,
     },
-    "thermal_growth": {"relative_growth": 0.0, "time_constant_s": 10.0},
+    "thermal_growth": {"relative_growth": 0.0, "time_constant_s": 10.0, "bearing_m": 0.0},
     "cogging_torque": {"amplitude_n_m": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
     "torque_ripple": {"fraction": 0.0, "cycles_per_rev": 6.0, "phase_rad": 1.0},
     "torque_saturation": {"limit_n_m": VALUE},

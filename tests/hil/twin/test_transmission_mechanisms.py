@@ -57,12 +57,23 @@ def test_cumulative_lead_error_grows_along_the_travel(angle, slope) -> None:
 @given(angle=st.floats(-600.0, 600.0), growth=st.floats(-1e-3, 1e-3), tau=st.floats(1.0, 1e4))
 def test_thermal_growth_starts_cold_and_settles(angle, growth, tau) -> None:
     cold, at_tau, warm = (
-        unloaded_table("thermal_growth", angle, time_s=multiple * tau, relative_growth=growth, time_constant_s=tau)
+        unloaded_table(
+            "thermal_growth", angle, time_s=multiple * tau, relative_growth=growth, time_constant_s=tau, bearing_m=0.0
+        )
         for multiple in (0.0, 1.0, 50.0)
     )
     assert cold == pytest.approx(RATIO_M * angle, abs=1e-12)
     assert warm == pytest.approx(unloaded_table("cumulative_lead_error", angle, slope_m_m=growth), abs=1e-12)
     assert at_tau - cold == pytest.approx((1.0 - 1.0 / e) * (warm - cold), rel=2e-3, abs=1e-12)
+
+
+@given(bearing=st.floats(-1.0, 1.0), growth=st.floats(-1e-3, 1e-3))
+def test_a_screw_does_not_grow_at_its_bearing(bearing, growth) -> None:
+    angle = bearing / RATIO_M
+    at = unloaded_table(
+        "thermal_growth", angle, time_s=9.0, relative_growth=growth, time_constant_s=3.0, bearing_m=bearing
+    )
+    assert at == pytest.approx(bearing, abs=1e-12)
 
 
 @given(deflection=deflections, gap=lengths)

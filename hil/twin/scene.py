@@ -37,6 +37,7 @@ class AxisFacts:
     positions_m: tuple[float, float] = (-math.inf, math.inf)  # first and last position of the table
     lost_m: float = math.inf  # largest lost motion that the encoders can hide, beside their lateness
     turn_known: bool = True  # False on a linear axis without a lead
+    torque_delay_s: float = 0.0  # by which a torque acts after it is recorded
     held_s: Callable[[float], float] = _always  # longest time for which |torque command| is at a level or above
     # share of the rows in which the axis moves whose |torque command| is above a level
     driven: Callable[[float], float] = _all

@@ -37,6 +37,7 @@ def axis_facts(bench: Bench, runs: Sequence[Measured] = ()) -> AxisFacts:
         ),
         lost_m=max(apart, default=math.inf),
         turn_known=physics.turn_known,
+        torque_delay_s=bench.torque_delay_s or 0.0,
         held_s=lambda level: max((_held_s(run, level) for run in runs), default=math.inf),
         driven=lambda level: _driven(runs, level),
         swings=lambda line_hz: _swings(runs, line_hz),

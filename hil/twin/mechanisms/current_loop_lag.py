@@ -1,12 +1,16 @@
 """Current loop lag: the current follows its command late."""
 
 import math
+from collections.abc import Sequence
 
 from numba import njit
 
 from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
+from hil.twin.scene import AxisFacts
+
+_HIDDEN = 1  # variant
 
 
 @njit
@@ -26,6 +30,11 @@ def _lagging_current(value: float, at: Moment, parameters: Row, memory: Row) -> 
     return value + behind * gone * time_constant_s / at.step_s
 
 
+def _late(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
+    """Check that a torque whose lag is not recorded acts after the recorded one: else only its curvature is told."""
+    return variant != _HIDDEN or values[0] + axis.torque_delay_s > 0.0
+
+
 MECHANISM = Mechanism(
     id="current_loop_lag",
     block=Block.DRIVE,
@@ -39,4 +48,5 @@ MECHANISM = Mechanism(
     ),
     text=Text("The motor current follows its command with a time constant of {time_constant_s}.", Picture.DELAY),
     search=SearchHints(lambda s: [(2e-4,), (1e-3,)], lambda a: (5e-4,), proportional=False),
+    can_be=_late,
 )

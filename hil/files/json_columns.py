@@ -135,6 +135,31 @@ def _rows(records: list[dict[str, Any]]) -> tuple[list[bool], list[int]]:
     return is_row, once
 
 
+def _with_channels(data: dict[str, Any], into: RecordColumns, within: str) -> dict[str, Any]:
+    """The data without its objects of one list each, which are channels by name if they are as long as each other."""
+    found = {name: (own, one) for name, one in data.items() if isinstance(one, dict) and (own := _only_list(one))}
+    if len(found) < 2 or len({len(own) for own, _ in found.values()}) > 1:
+        return data
+    for name, (own, one) in found.items():
+        into.lists[name] = own
+        into.units.update({name: unit} if (unit := first_of(one, UNIT_KEYS, str)) else {})
+        more = {f"{within}{name}.{key}": value for key, value in one.items()}
+        into.scalars.update({key: float(value) for key, value in more.items() if _is_number(value)})
+        into.texts.update({key: value for key, value in more.items() if isinstance(value, str)})
+    return {name: one for name, one in data.items() if name not in found}
+
+
+def _only_list(data: dict[str, Any]) -> list[Any] | None:
+    """The values of an object whose only list or object they are; None of another one."""
+    values: list[Any] | None = first_of(data, VALUE_KEYS, list)
+    inner = [value for value in data.values() if isinstance(value, list | dict)]
+    return values if values and len(inner) == 1 and not isinstance(values[0], list | dict) else None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> None:
     """Put what `data` holds into `into`; `within` is the path to it, with a point at its end."""
     lists, units = into.lists, into.units
@@ -163,6 +188,7 @@ def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> No
         for index, name in enumerate(names):
             lists[name] = [row[index] if index < len(row) else None for row in data[named:]]
     elif isinstance(data, dict):
+        data = _with_channels(data, into, within)
         names, rows = data.get("columns"), data.get("data", data.get("rows"))
         if isinstance(names, list) and isinstance(rows, list) and all(isinstance(row, list) for row in rows):
             for index, name in enumerate(names):
@@ -171,17 +197,10 @@ def _collect(path: Path, data: Any, into: RecordColumns, within: str = "") -> No
         for name, value in data.items():
             if isinstance(value, list) and value and not isinstance(value[0], dict | list):
                 lists[name] = value
-            elif isinstance(value, int | float) and not isinstance(value, bool):
+            elif _is_number(value):
                 into.scalars[f"{within}{name}"] = float(value)
             elif isinstance(value, str):
                 into.texts[f"{within}{name}"] = value
-            elif (
-                isinstance(value, dict)
-                and (own := first_of(value, VALUE_KEYS, list))
-                and not isinstance(own[0], dict | list)
-            ):
-                lists[name] = own
-                units.update({name: unit} if (unit := first_of(value, UNIT_KEYS, str)) else {})
             elif isinstance(value, dict | list):
                 if isinstance(value, dict) and all(isinstance(unit, str) for unit in value.values()):
                     units.update(value)

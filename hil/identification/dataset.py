@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.bench.bench_file import Bench
 from hil.errors import InputError
+from hil.identification.derivatives import matched
 from hil.identification.laps import Laps
 from hil.identification.measured import Measured
 from hil.identification.observability import Observability, common
@@ -29,8 +30,9 @@ class NoiseApart(NamedTuple):
     """A run without the noise of its motion, the rows (n,) that it tells, and what `hil.identification.noise_apart`
     makes of its residuals (n,) by channel.
 
-    `noise` and `measured` are of a reference with an inertia [motor unit]: what the noise makes, and all that was
-    measured. The motor's is filtered by `taps` (k,) and a gain.
+    `noise`, `measured` and `reference` (n,) are of a reference with an inertia [motor unit]: what the noise makes, all
+    that was measured, and the motor without noise. A change of the motor's passes the mean over `window` rows, as its
+    torque did; all of it is filtered by `taps` (k,) and a gain.
     """
 
     smooth: Measured
@@ -40,6 +42,8 @@ class NoiseApart(NamedTuple):
     inertia: float
     taps: FloatArray
     gain: float
+    reference: FloatArray
+    window: int
 
     def of(self, channel: str, free: FloatArray, inertia: float) -> FloatArray:
         """Residual (n,) of a channel with that of the run without noise, of a twin with an inertia [motor unit]."""
@@ -47,7 +51,8 @@ class NoiseApart(NamedTuple):
             return np.where(self.rows, free + self.noise[channel], self.measured[channel])
         found = self.measured[channel].copy()
         with np.errstate(over="ignore", invalid="ignore"):  # a hypothesis may be unstable
-            torque = (free * (inertia / self.inertia) + self.noise[channel])[self.rows]
+            change = matched(free * (inertia / self.inertia) - self.reference, self.window)
+            torque = (self.reference + change + self.noise[channel])[self.rows]
             found[self.rows] = self.gain * filtered(torque, [self.rows], self.taps)
         return found
 

@@ -68,8 +68,6 @@ def bic_gain(better: Fit, worse: Fit, filters: Sequence[Filter] | None = None) -
         worse.residuals.parts.values(),
         strict=True,
     ):
-        if _of_noise(better, a, b):
-            continue
         blur = _BLUR * a.size
         left, right = lfilter(taps, [1.0], a), lfilter(taps, [1.0], b)
         white += a.size * np.log((float(right @ right) + blur) / (float(left @ left) + blur))
@@ -93,17 +91,10 @@ def by_energy(better: Fit, worse: Fit) -> float:
     more = better.hypothesis.free - worse.hypothesis.free
     evidence = rows = 0.0
     for a, b in zip(better.residuals.parts.values(), worse.residuals.parts.values(), strict=True):
-        if _of_noise(better, a, b):
-            continue
         own, blur = a.size / correlation_time(a), _BLUR * a.size
         evidence += own * np.log((float(b @ b) + blur) / (float(a @ a) + blur))
         rows += own
     return float(evidence - more * np.log(rows))
-
-
-def _of_noise(fit: Fit, better: FloatArray, worse: FloatArray) -> bool:
-    """True if both fits leave less than the noise of a channel: less of it is no evidence, a lag passes less."""
-    return not fit.data.apart and max(float(better @ better), float(worse @ worse)) < better.size
 
 
 def refuted(evidence: float, more: float) -> bool:

@@ -61,7 +61,8 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
             smooth, free, noise = driven, seen, {name: measured[name] - seen[name] for name in measured}
         noise["motor"] = seen["motor"] - free["motor"]
         gain = rms(measured["motor"][rows]) / max(rms(filtered(seen["motor"][rows], [rows], taps)), 1e-300)
-    return NoiseApart(smooth, rows, noise, measured, inertia(reference.resolved.bench), taps, gain)
+    of_reference = inertia(reference.resolved.bench), taps, gain, free["motor"], own.window
+    return NoiseApart(smooth, rows, noise, measured, *of_reference)
 
 
 def _driven(run: Measured, torque: FloatArray) -> Measured:

@@ -1,9 +1,9 @@
 """Constants that a file gives beside its columns: in lines above the numbers, or as scalars with a name.
 
-A line holds one or several of "words [(unit)] [: = ; ,] number [unit] [words]". The words of a constant end those
-before the number, or follow its unit ("a screw with 5 mm lead"); a ratio of units such as N m/A or counts/rev says by
-itself what it is. Words are those of `lexicon.yaml`, compared without accents; a scalar has its unit in its name. The
-way per turn of the motor goes before all other words of a lead, which may be behind a gear.
+A line holds one or several of "words [(unit)] [: = ; ,] number [unit]". The words of a constant end those before the
+number, those of a lead may follow its unit ("a screw with 5 mm lead"); a ratio of units such as N m/A or counts/rev
+says by itself what it is. Words are those of `lexicon.yaml`, compared without accents; a scalar has its unit in its
+name. The way per turn of the motor goes before all other words of a lead, which may be behind a gear.
 """
 
 import re
@@ -52,14 +52,18 @@ _PER = re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
 _WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
-# 32 mm feed per motor revolution
-_PER_MOTOR_TURN = re.compile(r"^ *([a-z]+)(?: [a-z]+){0,4} ?(?:/|\b(?:per|pro|je)\b) ?motor[ -]?(?:turn|rev|umdr)")
-_SENTENCES = re.compile(r"->|\. ")
-_ENDS = re.compile(r"[\[\](){},;|\t\">:]|->|\. ")
-_DEVIATES = re.compile(r"\b(error|deviation|tolerance|fehler|abweichung|toleranz)")
+# behind a number: 32 mm [ram] feed per motor revolution; 10 mm pitch directly coupled, 4 mm lead, ...
+_PER_MOTOR_TURN = re.compile(
+    r"^ *([a-z]+)(?:( [a-z]+)? (?:feed|travel|movement|vorschub|weg))?"
+    r" ?(?:/|\b(?:per|pro|je)\b) ?motor[ -]?(?:turn|rev|umdr)"
+)
+_BEHIND = re.compile(r"^ *([a-z]+) ([^\W\d]+)(?= *(?:$|[\[\](){},;:|\t\"]|->|[.] |[.]$| -|directly|direkt))")
+_DEVIATES = re.compile(
+    r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
+    r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"
+)
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
-_MOST_WORDS = 3  # of a constant, behind a number
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
 _IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
 
@@ -95,13 +99,13 @@ def _statements(line: str) -> Iterator[_Statement]:
         return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
-        before = _SENTENCES.split(folded[matches[index - 1].end() if index else 0 : match.start()])[-1]
+        before = folded[matches[index - 1].end() if index else 0 : match.start()]
         end = matches[index + 1].start() if index + 1 < len(matches) else len(folded)
         value, behind = _number(match[0]), folded[match.end() : end]
         if value is None or _is_list(folded, matches[index:], value):
             continue
-        if not _BRACKET.search(before):
-            yield from _words_behind(before, value, behind, end == len(folded), header_text(line))
+        if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
+            yield lead
         if re.search(r"[^\W\d]", before):
             yield _words_before(before, value, behind, header_text(line))
 
@@ -119,21 +123,17 @@ def _words_before(before: str, value: float, behind: str, line: str) -> _Stateme
     return _Statement(words, value, (*units, *units_behind), line, phrase)
 
 
-def _words_behind(before: str, value: float, text: str, last: bool, line: str) -> Iterator[_Statement]:
-    """Statements of a number whose words follow its unit: a ball screw with 10 mm pitch, 2.4 Nm rated torque.
-
-    `last`: no other number follows, to which the words might belong.
-    """
+def _lead_behind(before: str, value: float, text: str, line: str) -> _Statement | None:
+    """The statement of a lead whose words follow its unit: a ball screw with 10 mm pitch; None without one."""
+    if _DEVIATES.search(f"{before} {text}"):
+        return None
     if turn := _PER_MOTOR_TURN.match(text):
-        yield _Statement("lead", value, (turn[1],), line, of_motor=True)
-        return
-    phrase, *others = _ENDS.split(text)
-    unit, *behind = _plain(phrase).split() or [""]
-    if not behind or not (last or others) or _DEVIATES.search(phrase):
-        return
+        return _Statement("lead", value, (turn[1],), line, of_motor=True)
+    told = _BEHIND.match(text)
     name = re.sub(rf" ({'|'.join(lexicon().joints)})$", "", _plain(before))
-    for take in range(1, min(len(behind), _MOST_WORDS) + 1):
-        yield _Statement(f"{name} {' '.join(behind[:take])}", value, (unit,), line)
+    words = f"{name} {told[2]}" if told else ""
+    is_lead = re.search(_pattern(lexicon().constants[Constant.LEAD]), words)
+    return _Statement(words, value, (told[1],), line) if told and is_lead else None
 
 
 def _is_list(text: str, matches: list[re.Match[str]], value: float) -> bool:

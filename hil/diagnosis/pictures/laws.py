@@ -135,10 +135,8 @@ def _per_metre(term: Term, diagnosis: Diagnosis, time_s: FloatArray) -> FloatArr
 
 
 def _from_bearing(diagnosis: Diagnosis, view: View) -> FloatArray:
-    """Distance (n,) from the place that does not move."""
-    last_s = np.asarray(view.run.time_s[-1:])
-    still = _at(view.term, diagnosis, time_s=last_s, table_m=np.array(0.0)) / _per_metre(view.term, diagnosis, last_s)
-    return _position(diagnosis, view) + float(still[0])
+    """Distance (n,) from the place that does not move: the last parameter."""
+    return _position(diagnosis, view) - view.term.values[-1]
 
 
 def _in_proportion(diagnosis: Diagnosis, view: View) -> FloatArray:

@@ -208,8 +208,9 @@ def screen(base: Fit, points: Sequence[Term], views: Sequence[_View] = ()) -> li
     def candidate(start: Term) -> Candidate:
         directions = [direction(term) for term in spanning(start)]
         instead = is_scaled(start) and any(repeats(start, entry.active()) for entry in base.hypothesis.kept)
-        nothing = _within(combined(start, np.zeros(len(directions))), start)
-        gone = direction(nothing) if instead else np.zeros(base.rows)
+        gone = np.zeros(base.rows)
+        if instead:
+            gone = direction(_within(combined(start, np.zeros(len(directions))), start))
         found = [scored(start, directions, gone, view) for view in views]
         best = max(found, key=lambda one: max(one.by_channel.values()))  # of what it explains most it tells its size
         score, own = (max(values) for values in zip(*((one.score, one.own) for one in found), strict=True))

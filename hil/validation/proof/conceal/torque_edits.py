@@ -36,6 +36,7 @@ _HIGHEST = 2.0  # of the Coulomb friction: in a zone
 _STEEPEST_M = 1e-3  # flank of a zone
 _COMPRESSED = 0.5  # of the largest torque: level above which the measured torque is too small
 MOMENTS = (0.25, 0.75)  # shares of the half between which a change lies
+_SLOPED = 0.3  # of the torque constant: change at the farthest place
 _SATURATED = 0.25  # of the largest torque: torque per ampere that is lost there
 
 
@@ -161,8 +162,10 @@ def _rippling(half: Half, rng: Rng) -> Edit | None:
 
 def _along_the_travel(half: Half, rng: Rng) -> Edit | None:
     torque, at = half.torque, half.position_m
-    largest = 0.3 / max(float(np.max(np.abs(at))), 1e-300)
-    mechanism = torque_constant_gradient.MECHANISM
+    mechanism, farthest_m = torque_constant_gradient.MECHANISM, float(np.max(np.abs(at)))
+    if farthest_m == 0.0:
+        return None
+    largest = min(_SLOPED / farthest_m, mechanism.parameters[0].high)
     return Edit(EditedChannel.TORQUE, lambda a: torque / (1.0 + a * at), largest, mechanism, told=(0,), signed=True)
 
 

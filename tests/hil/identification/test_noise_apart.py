@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from diagnosis_runs import bench, changed, recorded
+from foreign_axis import INERTIA_KG_M2, axis, renamed, write
 
+from hil.bench.bench_file import load_bench
 from hil.bench.control_section import UnknownControl
+from hil.commands.identify import identify
+from hil.commands.import_ import import_
 from hil.diagnosis.preparation.prepare import prepare
 from hil.identification.estimator import Fit
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.residual_scales import inertia
+from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain
+from hil.recording.recording import read_recording
 
 KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})
@@ -41,3 +48,34 @@ def test_no_inertia_gains_by_answering_less() -> None:
     true = inertia(KNOWN)
     assert inertia(apart.bench) == pytest.approx(true, rel=0.02)
     assert abs(inertia(apart.bench) - true) < abs(inertia(fit.bench) - true)
+
+
+def of_a_coarse_encoder(folder: Path, added_n_m: float = 0.0) -> Fit:
+    """The fit below the noise of an axis without a spring, whose motion needs a mean over many rows.
+
+    With a torque of 12 cycles per turn in its measured torque.
+    """
+    columns, count = axis(6000), 2.0 * np.pi / 2000.0
+    columns["torque"] += np.random.default_rng(1).normal(0.0, 0.05, columns["torque"].size)
+    columns["torque"] -= added_n_m * np.sin(12.0 * columns["angle"] + 0.5)
+    columns["angle"] = count * np.round(columns["angle"] / count)
+    named = renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm")
+    import_(write(folder / "log.csv", named), None, folder / "log.parquet", None, None)
+    identify([folder / "log.parquet"], folder / "axis.yaml")
+    fit = fit_nominal_parameters(
+        prepare([read_recording(folder / "log.parquet")], [], load_bench(folder / "axis.yaml")).train
+    )
+    plain = fit_plain(fit.data)
+    assert plain is not None
+    assert fit.within_noise
+    return replace(fit.estimator, data=noise_apart(fit.data, fit.hypothesis, plain)).fit(fit.hypothesis)
+
+
+def test_what_a_mean_takes_off_the_motion_is_no_inertia(tmp_path: Path) -> None:
+    assert inertia(of_a_coarse_encoder(tmp_path).bench) == pytest.approx(INERTIA_KG_M2, rel=2e-3)
+
+
+def test_a_torque_keeps_the_size_that_the_mean_takes_off_it(tmp_path: Path) -> None:
+    without = of_a_coarse_encoder(tmp_path, 0.04)
+    found = without.estimator.fit(without.hypothesis.with_term(Term("cogging_torque", 0, (0.02, 12.0, 0.0))))
+    assert found.terms[-1].values[0] == pytest.approx(0.04, rel=0.3)

@@ -12,6 +12,7 @@ from foreign_axis import LEAD_M, answered, axis, csv_text, renamed, write
 
 from hil.commands.import_ import import_
 from hil.errors import InputError
+from hil.files.json_columns import read_json
 from hil.importing.by_map import import_recording
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
@@ -236,6 +237,13 @@ def test_json_in_the_forms_that_tools_write(tmp_path: Path, content: Any) -> Non
     path = tmp_path / "log.json"
     path.write_text(json.dumps(content(ENGLISH)))
     check(imported(path))
+
+
+def test_an_object_of_lists_is_no_channel(tmp_path: Path) -> None:
+    """Whatever their names are."""
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps({"recording": {**{k: v.tolist() for k, v in ENGLISH.items()}, "data": [1.0, 2.0]}}))
+    assert set(read_json(path).lists) == {*ENGLISH, "data"}
 
 
 def test_a_message_per_row_is_a_joint_state_of_ros(tmp_path: Path) -> None:

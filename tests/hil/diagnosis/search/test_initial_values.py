@@ -11,6 +11,7 @@ from diagnosis_runs import bench, dataset, evaluated, fitted, one_way, recorded
 from geared_axis import geared
 
 from hil.bench.bench_file import MechanismEntry, load_bench
+from hil.bench.control_section import UnknownControl
 from hil.diagnosis.search.facts import axis_facts
 from hil.diagnosis.search.initial_values import claimable, is_rare, likenesses, observable, possible
 from hil.diagnosis.search.score_test import offered
@@ -114,6 +115,17 @@ def test_a_wave_longer_than_the_travel_has_no_name(train: Dataset, term: Term, s
 )
 def test_values_that_belong_to_another_cause_have_no_name(train: Dataset, term: Term, stands: bool) -> None:
     assert claimable(term, OWNER, train.runs) is stands
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "variant", "stands"), [(0.0, 1, True), (-5e-4, 1, True), (-2e-3, 1, False), (-2e-3, 0, True)]
+)
+def test_a_hidden_lag_of_a_torque_that_acts_before_its_record_has_no_name(
+    train: Dataset, delay_s: float, variant: int, stands: bool
+) -> None:
+    unknown = UnknownControl(law="unknown", torque_delay_s=delay_s)
+    late = OWNER.model_copy(update={"control": unknown})
+    assert claimable(Term("current_loop_lag", variant, (1e-3,)), late, train.runs) is stands
 
 
 @pytest.mark.parametrize(("leads", "rare"), [(1.0, True), (0.5, True), (0.27, False)])

@@ -15,7 +15,7 @@ from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.search.by_shape import _resolved, fitted, shown
 from hil.diagnosis.search.forward_selection import over
 from hil.diagnosis.search.score_test import Candidate
-from hil.diagnosis.search.shape import log_chance_below_noise, log_chance_of_shape
+from hil.diagnosis.search.shape import log_chance_below_noise, log_chance_of_shape, sizes
 from hil.identification.estimator import Fit
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters
@@ -103,3 +103,11 @@ def test_a_wave_that_the_rows_do_not_resolve_is_not_begun() -> None:
     highest = math.pi / float(np.median(np.concatenate(steps)))  # two rows for each cycle
     begun = [Term("cogging_torque", 0, (0.05, order, 0.4)) for order in (6.0, 0.9 * highest, 1.1 * highest)]
     assert [_resolved(without, one) for one in begun] == [True, True, False]
+
+
+def test_a_smoothed_motion_tells_no_lag() -> None:
+    """A mean is one."""
+    without = base(torque_noise_n_m=0.15)
+    lag, cogging = (without.hypothesis.with_term(term) for term in (Term("current_loop_lag", 1, (1e-3,)), COGGING))
+    asked = [len(sizes([one], without)) for one in (lag, cogging)]
+    assert asked[0] == asked[1] - 1 > 0

@@ -124,7 +124,7 @@ def test_a_hidden_lag_of_a_torque_that_acts_before_its_record_has_no_name(
     train: Dataset, delay_s: float, variant: int, stands: bool
 ) -> None:
     unknown = UnknownControl(law="unknown", torque_delay_s=delay_s)
-    late = OWNER.model_copy(update={"control": unknown})
+    late = OWNER.model_copy(update={"control": unknown}).sampled(1e-3)
     assert claimable(Term("current_loop_lag", variant, (1e-3,)), late, train.runs) is stands
 
 

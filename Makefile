@@ -35,10 +35,10 @@ test: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadfile -m "not long and not net"
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -m "not long and not net"
 
 test-long: setup
-	$(BIN)/pytest -n 2 --dist loadfile -m "not net"
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -m "not net"
 
 fuzz: setup
 	$(BIN)/python tests/fuzz/fuzz.py

@@ -32,7 +32,7 @@ class NoiseApart(NamedTuple):
 
     `noise`, `measured` and `reference` (n,) are of a reference with an inertia [motor unit]: what the noise makes, all
     that was measured, and the motor without noise. A change of the motor's passes the mean over `window` rows, as its
-    torque did; all of it is filtered by `taps` (k,) and a gain.
+    torque did (0: none); all of it is filtered by `taps` (k,) and a gain.
     """
 
     smooth: Measured
@@ -51,7 +51,8 @@ class NoiseApart(NamedTuple):
             return np.where(self.rows, free + self.noise[channel], self.measured[channel])
         found = self.measured[channel].copy()
         with np.errstate(over="ignore", invalid="ignore"):  # a hypothesis may be unstable
-            change = matched(free * (inertia / self.inertia) - self.reference, self.window)
+            change = free * (inertia / self.inertia) - self.reference
+            change = matched(change, self.window) if self.window else change
             torque = (self.reference + change + self.noise[channel])[self.rows]
             found[self.rows] = self.gain * filtered(torque, [self.rows], self.taps)
         return found

@@ -1,18 +1,19 @@
 """Recordings below the noise: no hypothesis gains by passing less of the noise of their torque and motion.
 
-    r(theta) = w * e(theta; quiet) J(theta) / J(theta0)                           motor of an axis without a spring
+    r(theta) = w * [e0 + K (e(theta; quiet) J(theta) / J(theta0) - e0)],  e0 = e(theta0; quiet)    without a spring
     r(theta) = w * [e(theta; smooth) J(theta) / J(theta0) + e(theta0; left) - e(theta0; smooth)]      with springs
     r(theta) = e(theta; .) + [e(theta0; measured) - e(theta0; .)]                 other channels, as the motor
     r(theta) = e(theta0; measured)                                                rows that do not slide
 
-e: residuals block by block; theta0: a reference; J: inertia. Smooth is a recording with a motion without the noise of
-its encoder and the torque that the plain model needs for it; quiet and left have that torque and what the plain model
-leaves of the measured one, both of the same smoothed motion and torque. The noise of a torque drives a twin, and least
-squares of e(theta; measured) prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables;
-W. E. Deming, Statistical Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks,
-with the same noise for every hypothesis. A resonance would pass less of it: there it goes through the reference alone.
-So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain model leaves, so
-that slow errors do not hide a faster effect. About a reversal smoothed motion tells nothing.
+e: residuals block by block; theta0: a reference; J: inertia; K: the mean of the smoothed motion. Smooth is a recording
+with a motion without the noise of its encoder and the torque that the plain model needs for it; quiet has also what
+that model leaves of the measured torque through K, left all that it leaves by generalised least squares. The noise of a
+torque drives a twin, and least squares of e(theta; measured) prefers an axis that answers less: more inertia, a
+resonance, a lag (errors in variables; W. E. Deming, Statistical Adjustment of Data, 1943). Times the inertia, e of a
+rigid axis is the torque that it lacks, with the same noise for every hypothesis; torque and motion pass the same mean,
+and so does what a hypothesis changes. A resonance would pass less of the noise: there it goes through the reference
+alone. So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain model leaves,
+so that slow errors do not hide a faster effect. About a reversal smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
@@ -47,21 +48,24 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     own = measured_motion(run)
     moved, rows = own.moved if smoothed else measured_motion(intended(run)).moved, own.sliding(plain.slowest)
     needed, taps, gain = np.where(rows, plain.predict(moved), run.torque), np.ones(1), 1.0
-    # torque and motion through the same mean: what it takes off a motion alone is a torque that every twin lacks
-    left = np.where(rows, own.torque - plain.predict(own.moved), 0.0)
     smooth = _driven(replace(run, motor=moved.position), needed)
     measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
-    noise = {name: measured[name] - free[name] for name in measured}
+    noise, window = {name: measured[name] - free[name] for name in measured}, 0
     if rows.any():
-        taps, own_left = _whitened(run, moved, left, rows, plain, run.period_s / data.observer_s)
-        elastic = bool(reference.bench.axis.SPRINGS)
-        driven = _driven(smooth, needed + (own_left if elastic else left))
-        seen = reference.blocks(driven, data.observer_s, rests=run)
-        if not elastic:
-            smooth, free, noise = driven, seen, {name: measured[name] - seen[name] for name in measured}
-        noise["motor"] = seen["motor"] - free["motor"]
+        of_model = plain.predict(own.moved)
+        beyond = np.where(rows, run.torque - of_model, 0.0)
+        taps, left = _whitened(beyond, moved, rows, plain, run.period_s / data.observer_s)
+        if reference.bench.axis.SPRINGS:
+            seen = reference.blocks(_driven(smooth, needed + left), data.observer_s, rests=run)
+            noise["motor"] = seen["motor"] - free["motor"]
+        else:  # through the mean of the motion: what it takes off an acceleration is a torque that every twin lacks
+            window = own.window
+            smooth = _driven(smooth, needed + np.where(rows, own.torque - of_model, 0.0))
+            seen = free = reference.blocks(smooth, data.observer_s, rests=run)
+            noise = {name: measured[name] - free[name] for name in measured}
+            noise["motor"] = np.zeros(run.motor.size)
         gain = rms(measured["motor"][rows]) / max(rms(filtered(seen["motor"][rows], [rows], taps)), 1e-300)
-    of_reference = inertia(reference.resolved.bench), taps, gain, free["motor"], own.window
+    of_reference = inertia(reference.resolved.bench), taps, gain, free["motor"], window
     return NoiseApart(smooth, rows, noise, measured, *of_reference)
 
 
@@ -71,19 +75,18 @@ def _driven(run: Measured, torque: FloatArray) -> Measured:
 
 
 def _whitened(
-    run: Measured, moved: MeasuredMotion, left: FloatArray, rows: NDArray[np.bool_], plain: PlainModel, a: float
+    beyond: FloatArray, moved: MeasuredMotion, rows: NDArray[np.bool_], plain: PlainModel, a: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Filter (k,) that whitens what the plain model leaves of each row behind the observer, and what it leaves (n,).
+    """Filter (k,) that whitens the torque (n,) beyond the plain model behind the observer, and what it leaves (n,).
 
     The latter by generalised least squares, so that it does not bend the parameters of the plain model.
     """
-    raw = np.where(rows, run.torque - plain.predict(measured_motion(run).moved), 0.0)
     columns = np.column_stack([*plain_columns(later_motion(moved, plain.early_rows)).values()])
-    of_rows, *seen = (observed(one, a)[rows] for one in (raw, left, *columns.T))
-    taps = whitening_filter(of_rows, np.column_stack(seen[1:]), [rows])
-    white = np.column_stack([filtered(one, [rows], taps) for one in seen])
+    seen = np.column_stack([observed(one, a)[rows] for one in (beyond, *columns.T)])
+    taps = whitening_filter(seen[:, 0], seen[:, 1:], [rows])
+    white = np.column_stack([filtered(one, [rows], taps) for one in seen.T])
     again = columns @ np.linalg.lstsq(white[:, 1:], white[:, 0], RANK)[0]
-    return taps, np.where(rows, left - again, 0.0)
+    return taps, np.where(rows, beyond - again, 0.0)
 
 
 def smoothed_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:

@@ -72,7 +72,8 @@ def test_a_readme_that_is_not_there_is_refused(source: Path, tmp_path: Path) -> 
         draft_map(source, readme=tmp_path / "none.txt")
 
 
-def test_a_map_knows_the_readme_that_it_was_drafted_with(source: Path, readme: Path, tmp_path: Path) -> None:
+def test_a_map_knows_the_readme_that_it_was_drafted_with(readme: Path, tmp_path: Path) -> None:
+    source = write(tmp_path / "log.csv", COLUMNS)
     first = explain(source, tmp_path / "explained", readme=readme)
     (the_map,) = (tmp_path / "explained").glob("*-map.yaml")
     assert the_map.read_text().splitlines()[-1] == f"# Drafted with: --readme {readme}"

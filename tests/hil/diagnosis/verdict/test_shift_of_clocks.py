@@ -43,6 +43,7 @@ def test_plain_least_squares_tell_another_lateness(tmp_path: Path, rows_late: in
     assert _late_otherwise(other, one) is shifted
 
 
+@pytest.mark.long
 def test_clocks_that_run_apart_have_not_shifted(tmp_path: Path) -> None:
     """A delay that grows by 0.2 ms per second differs from part to part, and at no moment."""
     columns = axis(4 * ROWS)

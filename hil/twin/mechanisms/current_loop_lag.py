@@ -11,6 +11,7 @@ from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 _HIDDEN = 1  # variant
+_TAKEN_BACK = 2.0  # lag over the delay against it, up to which this takes back most
 
 
 @njit
@@ -31,8 +32,11 @@ def _lagging_current(value: float, at: Moment, parameters: Row, memory: Row) -> 
 
 
 def _late(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
-    """Check that a torque whose lag is not recorded acts after the recorded one: else only its curvature is told."""
-    return variant != _HIDDEN or values[0] + axis.torque_delay_s > 0.0
+    """Check that no delay takes back most of a lag that is not recorded: only its curvature would be told.
+
+    A torque that is recorded after it acts is a measured one, which shows a lag of the current.
+    """
+    return variant != _HIDDEN or values[0] > -_TAKEN_BACK * axis.torque_delay_s
 
 
 MECHANISM = Mechanism(

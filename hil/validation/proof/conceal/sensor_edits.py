@@ -99,8 +99,15 @@ def _growing(half: Half, rng: Rng) -> Edit | None:
         return None
     time_s = max(whole_s * rng.uniform(0.2, 1.0), _FASTEST_S)
     grown = -np.expm1(-half.time_s / time_s)
-    mechanism = thermal_growth.MECHANISM
-    return Edit(EditedChannel.TABLE, lambda g: (1.0 + g * grown) * table, _SCALE, mechanism, lambda g: (g, time_s))
+    bearing_m = float(np.median(table) + rng.uniform(-1.0, 1.0) * np.ptp(table))
+    mechanism, from_bearing = thermal_growth.MECHANISM, table - bearing_m
+    return Edit(
+        EditedChannel.TABLE,
+        lambda g: table + g * grown * from_bearing,
+        _SCALE,
+        mechanism,
+        lambda g: (g, time_s, bearing_m),
+    )
 
 
 def _interpolated(half: Half, rng: Rng) -> Edit | None:

@@ -52,11 +52,12 @@ _PER = re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
 _WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
-# behind a number: 32 mm [ram] feed per motor revolution; 10 mm pitch directly coupled, 4 mm lead, ...
+# behind a number: 32 mm [of strip, ram feed] per motor revolution; 10 mm pitch directly coupled, 4 mm lead, ...
 _PER_MOTOR_TURN = re.compile(
-    r"^ *([a-z]+)(?:( [a-z]+)? (?:feed|travel|movement|vorschub|weg))?"
+    r"^ *([a-z]+)(?: of(?: [a-z]+){1,2}|(?: [a-z]+)? (?:feed|travel|movement|vorschub|weg))?"
     r" ?(?:/|\b(?:per|pro|je)\b) ?motor[ -]?(?:turn|rev|umdr)"
 )
+_MOTOR_TURN_IS = re.compile(r"\bmotor[ -]?(?:turn|rev\w*|umdrehung) *(?:is|gives|equals|=|:|entspricht) *$")
 _BEHIND = re.compile(r"^ *([a-z]+) ([^\W\d]+)(?= *(?:$|[\[\](){},;:|\t\"]|->|[.] |[.]$| -|directly|direkt))")
 _DEVIATES = re.compile(
     r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
@@ -124,10 +125,11 @@ def _words_before(before: str, value: float, behind: str, line: str) -> _Stateme
 
 
 def _lead_behind(before: str, value: float, text: str, line: str) -> _Statement | None:
-    """The statement of a lead whose words follow its unit: a ball screw with 10 mm pitch; None without one."""
+    """The statement of a lead whose words follow its unit, or which a turn of the motor is; None without one."""
     if _DEVIATES.search(f"{before} {text}"):
         return None
-    if turn := _PER_MOTOR_TURN.match(text):
+    turn = _PER_MOTOR_TURN.match(text) or (_MOTOR_TURN_IS.search(before) and re.match(r" *([a-z]+)\b", text))
+    if turn:
         return _Statement("lead", value, (turn[1],), line, of_motor=True)
     told = _BEHIND.match(text)
     name = re.sub(rf" ({'|'.join(lexicon().joints)})$", "", _plain(before))

@@ -61,6 +61,7 @@ AXIS = axis()
             0.01,
         ),
         ("Vorschub 12 mm je Motorumdrehung", Constant.LEAD, 0.012),
+        ("One sample every 1 ms. Current is the measured q-current.", Constant.RATE, 1000.0),
         ("rolls 120 mm diameter, so 75.398 mm of strip per motor turn.", Constant.LEAD, 0.075398),
         ("gearbox and belt; one motor turn is 31.416 mm of belt.", Constant.LEAD, 0.031416),
         ("Lead ........ 5 mm", Constant.LEAD, 0.005),

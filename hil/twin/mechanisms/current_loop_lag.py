@@ -11,7 +11,7 @@ from hil.twin.picture import Picture
 from hil.twin.scene import AxisFacts
 
 _HIDDEN = 1  # variant
-_TAKEN_BACK = 2.0  # lag over the delay against it, up to which this takes back most
+_TAKEN_BACK = 2.0  # a lag up to this times the delay against it is mostly taken back
 
 
 @njit

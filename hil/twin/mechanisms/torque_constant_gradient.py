@@ -1,6 +1,6 @@
 """Torque constant gradient: torque per ampere rises or falls steadily along the travel.
 
-A magnet track whose air gap or magnets differ from end to end, or a motor cable and scaling that a sensor sees in part.
+A magnet track whose air gap, magnets or temperature differ from end to end.
 """
 
 from numba import njit

@@ -1,9 +1,10 @@
 """Fields that axis sections of a bench file share: bounded numbers, and the base of axes with a rotary motor."""
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from hil.errors import FieldError
 from hil.twin.physics import Physics
 from hil.twin.structure.chain import Chain
 
@@ -34,11 +35,33 @@ class AxisSection(BenchSection):
     linear: ClassVar[bool] = False  # the motor side is in m and N
     turns: ClassVar[bool] = False  # the load turns
     drive_unit: ClassVar[str] = "N m"  # of the torque channels: N m, N, or V of a motor driven by its voltage
+    held: tuple[str, ...] = Field((), description="keys of the axis whose values a diagnosis keeps: a weighed mass")
+    guessed: tuple[str, ...] = Field((), description="keys whose values are not known: a diagnosis looks far from them")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         cls.NOMINAL = (*cls.MASSES, *cls.SPRINGS, *cls.FRICTION)
+
+    @model_validator(mode="after")
+    def _held_is_refitted(self) -> Self:
+        require_keys("held", self.held, self.NOMINAL)
+        require_keys("guessed", self.guessed, self.refitted)
+        if not self.refitted:
+            raise FieldError(("held",), "given every key that a diagnosis refits, allowed all but one")
+        return self
+
+    @property
+    def refitted(self) -> tuple[str, ...]:
+        """Parameters that a diagnosis refits: `NOMINAL` without those held."""
+        return tuple(name for name in self.NOMINAL if name not in self.held)
+
+
+def require_keys(field: str, given: tuple[str, ...], allowed: tuple[str, ...]) -> None:
+    """Raise FieldError unless the keys that a field lists are among those that a diagnosis refits."""
+    others = [name for name in given if name not in allowed]
+    if others:
+        raise FieldError((field,), f"given {', '.join(others)}, allowed {', '.join(allowed)}")
 
 
 class Driven(AxisSection):

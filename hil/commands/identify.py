@@ -42,4 +42,4 @@ def identify(
         out.print(f"  {note}", markup=False)
     for note in draft.unsure:
         err.print(f"Please check: {note}", markup=False)
-    out.print(f"Bench: {target} ({draft.model})")
+    out.print(f"Bench: {target} ({draft.axis.model})")

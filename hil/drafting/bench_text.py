@@ -7,13 +7,15 @@ from hil.drafting.draft_bench import BenchDraft
 
 def bench_text(draft: BenchDraft) -> str:
     """The bench as text of a YAML file."""
+    axis = draft.axis
     lines = [
         f"# Bench of {draft.name}, drafted by hil identify from the recording alone.",
         "# +- is a standard error that counts what the model leaves. Replace what you know better.",
     ]
     lines += [f"# Please check: {note}" for note in draft.unsure]
-    lines += ["schema_version: 1", f"name: {_name(draft.name)}", "axis:", f"  model: {draft.model}"]
-    lines += [f"  {_line(value)}" for value in draft.axis]
+    lines += ["schema_version: 1", f"name: {_name(draft.name)}", "axis:", f"  model: {axis.model}"]
+    lines += [f"  {_line(value)}" for value in axis.values]
+    lines += [f"  guessed: [{', '.join(axis.guessed)}]   # take out what you know"] if axis.guessed else []
     if draft.control:
         lines += ["control:", *(f"  {_line(value)}" for value in draft.control)]
     elif draft.torque_delay is None:

@@ -24,7 +24,7 @@ class DraftedBench:
     @property
     def values(self) -> tuple[BenchValue, ...]:
         """Keys of axis and control law with value, unit and standard error; without a law those of the axis."""
-        return (*self.draft.axis, *self.draft.control)
+        return (*self.draft.axis.values, *self.draft.control)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -37,7 +37,7 @@ class DraftedBench:
         return tuple(self.draft.unsure)
 
     def __repr__(self) -> str:
-        lines = [f"Drafted bench of {self.draft.name}: {self.draft.model}"]
+        lines = [f"Drafted bench of {self.draft.name}: {self.draft.axis.model}"]
         lines += [f"  {one.key} = {one.shown}  ({one.error})" for one in self.values]
         lines += [] if self.draft.control else [f"  control: unknown, {self.draft.control_why}"]
         lines += [f"  {note}" for note in self.notes]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hil.bench.axis_fields import RATIOS
+from hil.bench.axis_fields import RATIOS, AxisSection
 from hil.bench.bench_file import MechanismEntry
 from hil.identification.derivatives import SMOOTH_S
 from hil.twin.library import BY_ID
@@ -20,6 +20,8 @@ CHATTER_STEP = 0.03
 # Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
 # compensate for a wrong structure.
 TRUST = 3.0
+# The same of values that are not known, as each half of a mass whose split is not told: shares of 0.5 to 99.5 %.
+GUESS = 100.0
 # Friction that a bench file gives as 0 is not known. Its scale goes with the inertia, so that a fit does not depend on
 # the unit of the torque: Coulomb friction that slows the axis by that many rad/s^2 or m/s^2, viscous friction that
 # slows it by that share per second. Step of the forward difference over it, and largest value in its unit.
@@ -93,12 +95,13 @@ class Coordinate:
         return min(step if self.edge else max(step, 1e-3), 0.1 * (self.high - self.low) / self.scale)
 
 
-def axis_coordinate(name: str, value: float, inertia: float) -> Coordinate:
+def axis_coordinate(name: str, axis: AxisSection, inertia: float) -> Coordinate:
     """The coordinate of a nominal parameter of an axis, by its value in the bench file and the inertia at the motor."""
+    value, trust = float(getattr(axis, name)), GUESS if name in axis.guessed else TRUST
     if name in RATIOS:
         return Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, least_step=1e-3)
     if value > 0.0:
-        return Coordinate(name, value, True, value / TRUST, value * TRUST)
+        return Coordinate(name, value, True, value / trust, value * trust)
     return Coordinate(name, LITTLE * inertia, False, 0.0, ANY, least_step=LITTLE_STEP)  # friction left out
 
 
@@ -116,7 +119,7 @@ def coordinate_of(name: str, parameter: Parameter, start: float) -> Coordinate:
 
 
 def known_values(entries: Sequence[MechanismEntry]) -> list[tuple[int, str, float]]:
-    """Index of the entry, name and value of each parameter that a bench file gives for its mechanisms, but for events.
+    """Index of the entry, name and value of each parameter of a bench's mechanisms, but of those held and of events.
 
     In the order of the entries; of one entry in the order of its mechanism's parameters.
     """
@@ -124,7 +127,7 @@ def known_values(entries: Sequence[MechanismEntry]) -> list[tuple[int, str, floa
         (index, name, entry.parameters[name])
         for index, entry in enumerate(entries)
         for name in BY_ID[entry.effect].names
-        if name in entry.parameters and BY_ID[entry.effect].over_time is None
+        if name in entry.parameters and name not in entry.held and BY_ID[entry.effect].over_time is None
     ]
 
 

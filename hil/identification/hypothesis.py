@@ -126,7 +126,7 @@ class Hypothesis:
         of the bench's mechanisms (`known_coordinates`).
         """
         delay = () if self.bench.torque_delay_s is None else (DELAY,)
-        return (*self.bench.axis.NOMINAL, *delay, *(coordinate.name for coordinate in self._known))
+        return (*self.bench.axis.refitted, *delay, *(coordinate.name for coordinate in self._known))
 
     @property
     def free(self) -> int:
@@ -142,7 +142,7 @@ class Hypothesis:
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Coordinates of x."""
         axis, inertia = self.bench.axis, float(self.bench.axis.physics().chain.inertia_kg_m2.sum())
-        coordinates = [axis_coordinate(name, float(getattr(axis, name)), inertia) for name in axis.NOMINAL]
+        coordinates = [axis_coordinate(name, axis, inertia) for name in axis.refitted]
         if DELAY in self.nominal:
             coordinates.append(delay_coordinate(self.bench.torque_delay_s or 0.0, self.bench.period_s))
         coordinates += self._known
@@ -160,7 +160,7 @@ class Hypothesis:
         """Nominal parameters (`nominal_count`,) as the bench file gives them."""
         delay_s = self.bench.torque_delay_s
         return [
-            *(float(getattr(self.bench.axis, name)) for name in self.bench.axis.NOMINAL),
+            *(float(getattr(self.bench.axis, name)) for name in self.bench.axis.refitted),
             *([] if delay_s is None else [delay_s]),
             *(value for _, _, value in known_values(self.bench.mechanisms)),
         ]
@@ -200,7 +200,7 @@ class Hypothesis:
     @cached_property
     def resolved(self) -> Resolved:
         """Bench and terms with the values of x."""
-        nominal = dict(zip(self.bench.axis.NOMINAL, self.values, strict=False))
+        nominal = dict(zip(self.bench.axis.refitted, self.values, strict=False))
         terms = tuple(
             replace(term, values=tuple(self.values[self.columns(index)])) for index, term in enumerate(self.terms)
         )
@@ -210,7 +210,7 @@ class Hypothesis:
             "mechanisms": with_values(self.bench.mechanisms, known),
         }
         if DELAY in self.nominal:
-            delay_s = self.values[len(self.bench.axis.NOMINAL)]
+            delay_s = self.values[len(self.bench.axis.refitted)]
             changed["control"] = self.bench.control.model_copy(update={DELAY: delay_s})
         return Resolved(self.bench.model_copy(update=changed), terms)
 

@@ -53,23 +53,27 @@ def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND, deadline_s
     """Fit the nominal parameters alone, first with a robust loss; fits from it have the same deadline.
 
     If the fit misses more torque than the bench file, or a mass ended at a bound, it is repeated with the masses of the
-    bench file, and the fit that misses less torque is taken.
+    bench file, and with its springs, whose damper may stand for friction or play behind them. The fit that misses the
+    least torque is taken.
     """
     estimator, begin = Estimator(data, deadline_s=deadline_s), Hypothesis(data.bench)
     fit = estimator.fit(begin, soft=SOFT, evaluations=_FIRST).refit(evaluations)
-    masses = [index for index, name in enumerate(begin.nominal) if name in data.bench.axis.MASSES]
-    stuck = set(fit.at_bound) & set(data.bench.axis.MASSES)
+    axis = data.bench.axis
+    stuck = set(fit.at_bound) & set(axis.MASSES)
     if not stuck and fit.missed_torque <= estimator.evaluate(begin).missed_torque:
         return fit
-    kept = estimator.fit(begin, soft=SOFT, evaluations=_FIRST, fixed=masses).refit(evaluations, fixed=masses)
-    return min(fit, kept, key=lambda fit: fit.missed_torque)
+    fits = [fit]
+    for names in filter(None, (axis.MASSES, axis.SPRINGS)):
+        kept = [index for index, name in enumerate(begin.nominal) if name in names]
+        fits.append(estimator.fit(begin, soft=SOFT, evaluations=_FIRST, fixed=kept).refit(evaluations, fixed=kept))
+    return min(fits, key=lambda fit: fit.missed_torque)
 
 
 def require_finite(fit: Fit) -> None:
     """Raise HilError if residuals of a fit are not finite: the twin, or its observer, is unstable."""
     if not all(np.isfinite(values).all() for channels in fit.residuals.channels for values in channels.values()):
         raise HilError(
-            f"the fit of {', '.join(fit.bench.axis.NOMINAL)} has no finite result: the twin of this axis is unstable "
+            f"the fit of {', '.join(fit.bench.axis.refitted)} has no finite result: the twin of this axis is unstable "
             f"at a period of {fit.data.runs[0].period_s:g} s; check masses, stiffness, units and signs, or give a "
             "recording with more motion"
         )

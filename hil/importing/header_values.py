@@ -63,6 +63,11 @@ _DEVIATES = re.compile(
     r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
     r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"
 )
+# behind a number, what it is: 8192 per motor turn, 250 samples per second, 5 ms per line
+_PER_TURN = re.compile(r"^ *(?:steps|pulses|increments|inkremente|counts)? ?(?:per|pro) (?:motor )?(?:turn|rev|umdr)")
+_OF_COUNTS = re.compile(r"\b(encoder|increments?|counts|steps|geber|inkremente|codeur|motor) *[(,:]? *$")
+_PER_SECOND = re.compile(r"^ *(?:samples|rows|lines|points) (?:per|a) s(?:ec|\b)")
+_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row|sample|point)\b")
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
@@ -105,6 +110,7 @@ def _statements(line: str) -> Iterator[_Statement]:
         value, behind = _number(match[0]), folded[match.end() : end]
         if value is None or _is_list(folded, matches[index:], value):
             continue
+        yield from _told_behind(before, value, behind, header_text(line))
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
             yield lead
         if re.search(r"[^\W\d]", before):
@@ -122,6 +128,16 @@ def _words_before(before: str, value: float, behind: str, line: str) -> _Stateme
     if unit and not any(units_behind) and not bracket:
         words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
     return _Statement(words, value, (*units, *units_behind), line, phrase)
+
+
+def _told_behind(before: str, value: float, text: str, line: str) -> Iterator[_Statement]:
+    """The statement of a number behind which its words stand, of counts per turn, a rate or a period."""
+    if _PER_TURN.match(text) and _OF_COUNTS.search(before):
+        yield _Statement("", value, ("counts/rev",), line)
+    if _PER_SECOND.match(text):
+        yield _Statement("sample rate", value, ("hz",), line)
+    if period := _PER_ROW.match(text):
+        yield _Statement("sample time", value, (period[1],), line)
 
 
 def _lead_behind(before: str, value: float, text: str, line: str) -> _Statement | None:

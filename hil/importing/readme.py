@@ -1,6 +1,7 @@
 """Hints of a user about a file: sampling rate, axis, and a README or data sheet with sizes and units."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +11,7 @@ from hil.importing.encodings import encoding_of
 from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import header_values
 from hil.importing.unit_lines import described
+from hil.importing.units import unit_named
 
 _LONGEST = 1_000_000  # bytes: no README is as long
 
@@ -45,10 +47,35 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     encoding = encoding_of(raw)
     lines = [line.decode(encoding) for line in raw]
     titles = {table.titles.get(name, name): name for name in table.columns}
-    told = {titles[title]: one for title, one in described(lines, list(titles)).items()}
+    listed = _listed(lines, list(titles)) | described(lines, list(titles))
+    told = {titles[title]: one for title, one in listed.items()}
     return replace(
         table,
         units={name: unit for name, (_, unit) in told.items() if unit} | table.units,
         words={name: words for name, (words, _) in told.items() if words} | table.words,
         constants=header_values(lines, {}) | table.constants,
     )
+
+
+def _listed(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Words and unit of columns in a list of them, a line each: "q_mot   motor encoder, degrees of the motor"."""
+    told = {}
+    for name in names:
+        begin = re.compile(rf"[\s*•-]*{re.escape(name)}(?:\s*[:=]\s*|\s+[-–]\s+|\s{{2,}}|\t\s*)(?=\S)(.*)")
+        rest = next((match[1] for line in lines if name and (match := begin.match(line))), "")
+        phrases = [part.strip() for part in re.split(r"[,;()]", rest) if part.strip()]
+        if unit := next((unit for part in phrases if (unit := _unit_at_an_end(part))), ""):
+            told[name] = ("" if phrases[0] == unit else phrases[0], unit)
+    return told if len(told) > 1 else {}
+
+
+def _unit_at_an_end(phrase: str) -> str:
+    """Unit with which a phrase without numbers begins or ends, "in mm", "degrees of the joint"; "" without one.
+
+    A letter is a unit at the end only, and "in" a word.
+    """
+    words = phrase.split()
+    if re.search(r"\d", phrase):
+        return ""
+    ends = [words[0], *words[-1:]] if len(words[0]) > 1 else words[-1:]
+    return next((word for word in ends if word != "in" and unit_named(word)), "")

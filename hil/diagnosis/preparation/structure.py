@@ -76,9 +76,11 @@ def rigid(bench: Bench) -> Bench:
     """The bench of an axis with all its mass as one."""
     axis, total = bench.axis, inertia(bench)
     friction = {name: getattr(axis, name) for name in axis.FRICTION}
-    one = (
+    one: Rotary | Rigid = (
         Rotary(gear_ratio=1.0 / axis.ratio_m_rad, inertia_kg_m2=total, **friction)
         if axis.turns
         else Rigid(lead_m=2.0 * pi * axis.ratio_m_rad, mass_kg=total / axis.ratio_m_rad**2, **friction)
     )
-    return bench.model_copy(update={"axis": one})
+    weighed = one.MASSES if set(axis.MASSES) <= set(axis.held) else ()
+    held = (*weighed, *(name for name in axis.held if name in axis.FRICTION))
+    return bench.model_copy(update={"axis": one.model_copy(update={"held": held})})

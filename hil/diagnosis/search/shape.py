@@ -266,7 +266,7 @@ def _other_values(fit: Fit) -> Iterator[Hypothesis]:
     """The hypothesis of a fit with each parameter beside those of the axis moved by a step, without edges."""
     hypothesis, steps = fit.hypothesis, fit.estimator.steps(fit.hypothesis)
     for index, one in enumerate(hypothesis.coordinates):
-        if index >= len(hypothesis.bench.axis.NOMINAL) and not one.edge:
+        if index >= len(hypothesis.bench.axis.refitted) and not one.edge:
             x = hypothesis.x.copy()
             x[index] += steps[index]
             yield hypothesis.moved(x)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from hil.bench.axis_models import TwoMass
 from hil.bench.bench_file import load_bench
 from hil.errors import InputError
 from hil.files.shipped import shipped_files
@@ -25,10 +26,16 @@ control: {position_gain_1_s: 36.84, velocity_gain_n_m_s_rad: 0.27}
     [
         ("lead_m: 0.010", "lead_m: 10", r"axis.lead_m: given 10, allowed less than or equal to 1 "),
         ("position_period_s: 0.004", "position_period_s: 4", r"control.position_period_s: given 4, allowed .* 0.1 "),
+        (
+            "lead_m: 0.010",
+            "held: [lead_m]\n  lead_m: 0.010",
+            r"axis.held: given lead_m, allowed motor_mass_kg, table_mass_kg",
+        ),
+        ("lead_m: 0.010", f"held: [{', '.join(TwoMass.NOMINAL)}]\n  lead_m: 0.010", r"axis.held: given every key"),
         ("{resolution_m: 0.5e-6}", "{resolution_m: 0.5}", r"encoders.table.resolution_m: given 0.5, allowed .* 0.001 "),
     ],
 )
-def test_a_value_in_the_wrong_unit_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_a_value_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     text = shipped_files("bench")["reference"].read_text()
     assert old in text
     path = tmp_path / "bench.yaml"

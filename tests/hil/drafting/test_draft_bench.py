@@ -216,8 +216,8 @@ def test_a_spring_is_said_and_does_not_turn_the_inertia() -> None:
     without, draft = (draft_bench(Recording("log", one, 1e-3)) for one in (columns, loaded))
     note = next(note for note in draft.notes if "(a spring)" in note)
     assert float(note.split("(a spring) ")[1].split(" N/m")[0]) == pytest.approx(2e3, rel=0.05)
-    assert draft.axis[0].key == "mass_kg"
-    assert draft.axis[0].value == pytest.approx(without.axis[0].value, rel=0.05)
+    assert draft.axis.values[0].key == "mass_kg"
+    assert draft.axis.values[0].value == pytest.approx(without.axis.values[0].value, rel=0.05)
 
 
 def joint(gear: float, stiffness: float, play_rad: float) -> dict[str, np.ndarray]:

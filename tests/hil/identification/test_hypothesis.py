@@ -11,6 +11,7 @@ from hil.bench.control_section import UnknownControl
 from hil.identification.coordinates import CHATTER_STEP, LAST_EDGE_STEP_S
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.measured import take
+from hil.identification.nominal_fit import fit_nominal
 from hil.identification.terms import Term
 
 OWNER = bench()
@@ -52,6 +53,18 @@ def test_values_of_known_mechanisms_are_fitted_and_numbered() -> None:
     changed = hypothesis.moved(x).resolved.bench.mechanisms
     assert changed[2].parameters["amplitude_n_m"] == pytest.approx(0.3)
     assert [one.active() for one in (*changed[:2], changed[3])] == [one.active() for one in (*entries[:2], entries[3])]
+
+
+@pytest.mark.parametrize("held", [("table_mass_kg",), OWNER.axis.NOMINAL[1:]])
+def test_values_that_the_owner_holds_are_not_refitted(held: tuple[str, ...]) -> None:
+    """Of the axis and of a mechanism; the others take up what the bench has wrong."""
+    load = MechanismEntry(effect="constant_load", parameters={"load_torque_n_m": 0.2}, held=("load_torque_n_m",))
+    wrong = {"table_mass_kg": 1.1 * OWNER.axis.table_mass_kg, "held": held}
+    owner = OWNER.model_copy(update={"axis": OWNER.axis.model_copy(update=wrong), "mechanisms": (load,)})
+    found = fit_nominal(dataset([take(recorded(OWNER, LOAD), owner)], owner))
+    assert {one.name for one in found.parameters} == set(OWNER.axis.NOMINAL) - set(held)
+    assert all(getattr(found.bench.axis, name) == getattr(owner.axis, name) for name in held)
+    assert found.bench.mechanisms == (load,)
 
 
 def test_differences_are_wide_where_a_nut_may_chatter() -> None:

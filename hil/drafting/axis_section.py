@@ -1,0 +1,150 @@
+"""The section `axis` of a drafted bench file: its kind, masses, stiffness and friction, each with its error."""
+
+from dataclasses import replace
+from math import hypot, pi
+from typing import NamedTuple
+
+from hil.drafting.bench_value import BenchValue, estimated
+from hil.drafting.plant_values import PlantValues, TransmissionValues
+from hil.drafting.ratio_values import gear_of
+from hil.identification.least_squares import Estimate
+from hil.quantities import ROTARY_LEAD_M, digits, unit_of
+from hil.recording.recording import Recording
+
+# Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
+_STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
+
+
+class AxisDraft(NamedTuple):
+    """A drafted section: keys with values, those whose values are not known, and what of them is told."""
+
+    model: str
+    values: list[BenchValue]
+    guessed: tuple[str, ...] = ()
+    told: str = ""
+
+    @property
+    def unsure(self) -> list[str]:
+        """What the owner of the axis should check."""
+        return [f"{', '.join(self.guessed)}: told are {self.told}"] if self.guessed else []
+
+
+def draft_axis(
+    recording: Recording,
+    plant: PlantValues,
+    transmission: TransmissionValues | None,
+    turns: bool,
+    lead: Estimate | None,
+) -> AxisDraft:
+    """Draft the section from what least squares tell; without a lead the axis is linear."""
+    if lead is None:
+        friction = [_friction("coulomb_force_n", plant.coulomb), _friction("viscous_force_n_s_m", plant.viscous)]
+        return AxisDraft("one_mass", [estimated("mass_kg", plant.inertia, "kg"), *friction])
+    deflection = None if transmission is None else _deflection_s2(transmission)
+    if turns and deflection is None and _in_volts(recording) and plant.viscous.significant:
+        return AxisDraft("dc_motor", _dc_motor(plant, lead))
+    if turns:
+        return _turning(plant, deflection, _sagging(plant, transmission), lead)
+    return _screw(plant, deflection, lead)
+
+
+def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
+    """Deflection of the transmission over the load's acceleration [s^2]; None where it is not told: a rigid axis.
+
+    A rigid axis has lead errors and play too. A spring has to be told, beside the delay of an encoder.
+    """
+    stretch = transmission.compliance_s2.scaled(-1.0)
+    if stretch.significant and stretch.value > _STIFFEST_S2:
+        return replace(stretch, how="deflection over acceleration")
+    return None
+
+
+def _screw(plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> AxisDraft:
+    mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
+    inertia = f"motor and screw included: inertia {digits(plant.inertia.value)} kg m^2 at the motor"
+    values = [BenchValue("lead_m", lead.value, f"m per revolution, +-{lead.std_error:.2g}", lead.how)]
+    if deflection is None:
+        values += [estimated("mass_kg", mass, "kg", inertia), *_rotary_friction(plant)]
+        return AxisDraft("rigid", values)
+    half, rotor = _guess(mass.scaled(0.5)), digits(1e-4 * (2.0 * pi / lead.value) ** 2)
+    split = f"half of {digits(mass.value)} kg: the split is not told; a rotor of 1e-4 kg m^2 counts {rotor} kg"
+    split_untold = [
+        estimated("motor_mass_kg", half, "kg", split),
+        estimated("table_mass_kg", half, "kg", f"the other half; {inertia}"),
+        estimated("stiffness_n_m", _stiffness(half, deflection), "N/m", "for this split"),
+    ]
+    keys = tuple(one.key for one in split_untold)
+    told = "the sum of the masses and table mass over stiffness"
+    return AxisDraft("two_mass", [*values, *split_untold, *_rotary_friction(plant)], keys, told)
+
+
+def _in_volts(recording: Recording) -> bool:
+    """True if the torque is a voltage whose torque per volt is not known: 1 N m stands for 1 V."""
+    origins, names = recording.metadata.get("channels", {}), recording.axis
+    origin = origins.get(names.torque) or origins.get(names.torque_command) or {}
+    return bool(origin.get("unit") == "V" and origin.get("si_per_volt") == 1.0)
+
+
+def _dc_motor(plant: PlantValues, lead: Estimate) -> list[BenchValue]:
+    """Values of a motor driven by a voltage, which stands in the place of the torque."""
+    inertia, slope = plant.inertia, plant.viscous
+    time_s = inertia.value / slope.value
+    error_s = abs(time_s) * hypot(inertia.std_error / inertia.value, slope.std_error / slope.value)
+    return [
+        estimated("gear_ratio", Estimate(ROTARY_LEAD_M / lead.value, 0.0, lead.how), "motor per load"),
+        estimated("time_constant_s", Estimate(time_s, error_s, inertia.how), "s"),
+        _friction("coulomb_voltage_v", plant.coulomb),
+        estimated("voltage_constant_v_s_rad", slope, "V s/rad"),
+    ]
+
+
+def _turning(plant: PlantValues, deflection: Estimate | None, sag: Estimate | None, lead: Estimate) -> AxisDraft:
+    gear = gear_of(lead)
+    values, friction = [estimated("gear_ratio", gear, "motor per load")], _rotary_friction(plant)
+    motor = _guess(plant.inertia.scaled(0.5))
+    load = motor.scaled(gear.value**2)
+    stiffness = sag or (None if deflection is None else _stiffness(load, deflection))
+    if stiffness is None:
+        inertia = estimated("inertia_kg_m2", plant.inertia, "kg m^2 at the motor")
+        return AxisDraft("rotary", [*values, inertia, *friction])
+    inertias = [
+        estimated("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
+        estimated("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
+    ]
+    spring, told = estimated("stiffness_n_m_rad", stiffness, "N m/rad"), "the sum of the inertias at the motor"
+    keys, by_sag = tuple(one.key for one in inertias), sag is not None
+    guessed = keys if by_sag else (*keys, spring.key)
+    told += "" if by_sag else " and load inertia over stiffness"
+    return AxisDraft("rotary_two_mass", [*values, *inertias, spring, *friction], guessed, told)
+
+
+def _guess(half: Estimate) -> Estimate:
+    """Half of a sum whose split is not identifiable; its standard error is the half itself."""
+    return replace(half, std_error=half.value)
+
+
+def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:
+    stiffness = mass.value / deflection.value
+    return Estimate(stiffness, stiffness * deflection.std_error / deflection.value, deflection.how)
+
+
+def _sagging(plant: PlantValues, transmission: TransmissionValues | None) -> Estimate | None:
+    """Stiffness from the deflection under gravity [N m/rad]; None where one of the two is not told."""
+    weight, sag = plant.gravity, transmission.sag_m if transmission else None
+    if weight is None or sag is None or not (weight.significant and sag.significant):
+        return None
+    error = hypot(weight.std_error / weight.value, sag.std_error / sag.value)
+    stiffness = weight.value / sag.value
+    return Estimate(stiffness, error * stiffness, "deflection under gravity")
+
+
+def _rotary_friction(plant: PlantValues) -> list[BenchValue]:
+    return [_friction("coulomb_torque_n_m", plant.coulomb), _friction("viscous_torque_n_m_s_rad", plant.viscous)]
+
+
+def _friction(key: str, estimate: Estimate) -> BenchValue:
+    sure = "" if estimate.significant else "not identifiable from this motion; "
+    how = sure + estimate.how
+    if not estimate.value > 0.0:
+        how = f"not identifiable from this motion: {estimate.value:.3g} is below 0; {estimate.how}"
+    return BenchValue(key, max(estimate.value, 0.0), f"{unit_of(key)}, +-{estimate.std_error:.2g}", how)

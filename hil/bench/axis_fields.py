@@ -36,7 +36,6 @@ class AxisSection(BenchSection):
     turns: ClassVar[bool] = False  # the load turns
     drive_unit: ClassVar[str] = "N m"  # of the torque channels: N m, N, or V of a motor driven by its voltage
     held: tuple[str, ...] = Field((), description="keys of the axis whose values a diagnosis keeps: a weighed mass")
-    guessed: tuple[str, ...] = Field((), description="keys whose values are not known: a diagnosis looks far from them")
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
@@ -45,8 +44,7 @@ class AxisSection(BenchSection):
 
     @model_validator(mode="after")
     def _held_is_refitted(self) -> Self:
-        require_keys("held", self.held, self.NOMINAL)
-        require_keys("guessed", self.guessed, self.refitted)
+        require_held(self.held, self.NOMINAL)
         if not self.refitted:
             raise FieldError(("held",), "given every key that a diagnosis refits, allowed all but one")
         return self
@@ -57,11 +55,11 @@ class AxisSection(BenchSection):
         return tuple(name for name in self.NOMINAL if name not in self.held)
 
 
-def require_keys(field: str, given: tuple[str, ...], allowed: tuple[str, ...]) -> None:
-    """Raise FieldError unless the keys that a field lists are among those that a diagnosis refits."""
-    others = [name for name in given if name not in allowed]
+def require_held(held: tuple[str, ...], allowed: tuple[str, ...]) -> None:
+    """Raise FieldError unless each key that is held is one that a diagnosis refits."""
+    others = [name for name in held if name not in allowed]
     if others:
-        raise FieldError((field,), f"given {', '.join(others)}, allowed {', '.join(allowed)}")
+        raise FieldError(("held",), f"given {', '.join(others)}, allowed {', '.join(allowed)}")
 
 
 class Driven(AxisSection):

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_fields import BenchSection, require_keys
+from hil.bench.axis_fields import BenchSection, require_held
 from hil.bench.axis_models import Axis, OneMass, model_of
 from hil.bench.compensation_section import CompensationSection
 from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
@@ -59,7 +59,7 @@ class MechanismEntry(BenchSection):
                     ("parameters", parameter.name),
                     f"given {value:g}, allowed {parameter.low:g} to {parameter.high:g} {parameter.dimension.value}",
                 )
-        require_keys("held", self.held, tuple(self.parameters))
+        require_held(self.held, tuple(self.parameters))
         return self
 
     def active(self) -> Active:

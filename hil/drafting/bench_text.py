@@ -15,7 +15,6 @@ def bench_text(draft: BenchDraft) -> str:
     lines += [f"# Please check: {note}" for note in draft.unsure]
     lines += ["schema_version: 1", f"name: {_name(draft.name)}", "axis:", f"  model: {axis.model}"]
     lines += [f"  {_line(value)}" for value in axis.values]
-    lines += [f"  guessed: [{', '.join(axis.guessed)}]   # take out what you know"] if axis.guessed else []
     if draft.control:
         lines += ["control:", *(f"  {_line(value)}" for value in draft.control)]
     elif draft.torque_delay is None:

@@ -20,8 +20,6 @@ CHATTER_STEP = 0.03
 # Bound of nominal parameters over the bench file, as a factor: beyond it lie minima in which implausible parameters
 # compensate for a wrong structure.
 TRUST = 3.0
-# The same of values that are not known, as each half of a mass whose split is not told: shares of 0.5 to 99.5 %.
-GUESS = 100.0
 # Friction that a bench file gives as 0 is not known. Its scale goes with the inertia, so that a fit does not depend on
 # the unit of the torque: Coulomb friction that slows the axis by that many rad/s^2 or m/s^2, viscous friction that
 # slows it by that share per second. Step of the forward difference over it, and largest value in its unit.
@@ -97,11 +95,11 @@ class Coordinate:
 
 def axis_coordinate(name: str, axis: AxisSection, inertia: float) -> Coordinate:
     """The coordinate of a nominal parameter of an axis, by its value in the bench file and the inertia at the motor."""
-    value, trust = float(getattr(axis, name)), GUESS if name in axis.guessed else TRUST
+    value = float(getattr(axis, name))
     if name in RATIOS:
         return Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, least_step=1e-3)
     if value > 0.0:
-        return Coordinate(name, value, True, value / trust, value * trust)
+        return Coordinate(name, value, True, value / TRUST, value * TRUST)
     return Coordinate(name, LITTLE * inertia, False, 0.0, ANY, least_step=LITTLE_STEP)  # friction left out
 
 

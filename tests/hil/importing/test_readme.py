@@ -89,3 +89,20 @@ def test_options_tell_what_the_user_told() -> None:
     words = told.options
     assert FileHints.of(dict(zip(words[::2], words[1::2], strict=True))) == told
     assert FileHints().options == []
+
+
+def test_a_unit_stands_among_the_words_of_a_column(tmp_path: Path) -> None:
+    """It begins or ends a phrase without a number; a distance meter and an article are no units."""
+    ratio, angle = 100, np.degrees(AXIS["angle"])
+    columns = {"t": AXIS["t"], "q_cmd": angle / ratio, "q_mot": np.round(angle, 2), "i": AXIS["torque"] / CONSTANT}
+    source, readme = write(tmp_path / "log.csv", columns), tmp_path / "joint.txt"
+    readme.write_text(
+        "Elbow joint, harmonic drive 100:1, torque constant 0.25 Nm/A\n"
+        " t      time s\n"
+        " q_cmd  commanded angle of the meter on the joint, degrees (joint side)\n"
+        " q_mot  motor encoder (16 bit), degrees of the MOTOR shaft\n"
+        " i      motor current A, measured\n"
+    )
+    entries = {one.channel: one.entry for one in draft_map(source, readme=readme).channels}
+    units = {entries[name]["column"]: entries[name]["unit"] for name in entries}
+    assert units == {"q_cmd": "deg", "q_mot": "deg", "i": "A"}

@@ -30,9 +30,9 @@ class NoiseApart(NamedTuple):
     """A run without the noise of its motion, the rows (n,) that it tells, and what `hil.identification.noise_apart`
     makes of its residuals (n,) by channel.
 
-    `noise`, `measured` and `reference` (n,) are of a reference with an inertia [motor unit]: what the noise makes, all
-    that was measured, and the motor without noise. A change of the motor's passes the mean over `window` rows, as its
-    torque did (0: none); all of it is filtered by `taps` (k,) and a gain.
+    `noise` and `measured` (n,) are of a reference with an inertia [motor unit]: what the noise makes, and all that was
+    measured. What a twin makes of the motor without noise passes the mean over `window` rows, as the noise did (0:
+    none); the sum is filtered by `taps` (k,) and a gain.
     """
 
     smooth: Measured
@@ -42,7 +42,6 @@ class NoiseApart(NamedTuple):
     inertia: float
     taps: FloatArray
     gain: float
-    reference: FloatArray
     window: int
 
     def of(self, channel: str, free: FloatArray, inertia: float) -> FloatArray:
@@ -51,9 +50,9 @@ class NoiseApart(NamedTuple):
             return np.where(self.rows, free + self.noise[channel], self.measured[channel])
         found = self.measured[channel].copy()
         with np.errstate(over="ignore", invalid="ignore"):  # a hypothesis may be unstable
-            change = free * (inertia / self.inertia) - self.reference
-            change = matched(change, self.window) if self.window else change
-            torque = (self.reference + change + self.noise[channel])[self.rows]
+            lacking = free * (inertia / self.inertia)
+            lacking = matched(lacking, self.window) if self.window else lacking
+            torque = (lacking + self.noise[channel])[self.rows]
             found[self.rows] = self.gain * filtered(torque, [self.rows], self.taps)
         return found
 

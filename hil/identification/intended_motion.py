@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.identification.derivatives import MeasuredMotion, matched_motion
 from hil.identification.measured import Measured
-from hil.identification.plain_model import LONGEST_S, MotionData, motion_data
+from hil.identification.plain_model import LONGEST_S, MotionData, motion_data, noiseless_motion
 from hil.identification.sensor_noise import moving, white_noise
 from hil.identification.whitening import RANK
 
@@ -40,6 +40,11 @@ def intended(run: Measured) -> Measured:
         if _loses(data, matched_motion(motor, run.period_s, data.window)) < _ANOTHER:
             return replace(run, motor=motor)
     return replace(run, motor=_slow(run, data))
+
+
+def intended_motion(run: Measured) -> MeasuredMotion:
+    """The intended motion of a run (n,) with its derivatives, not through the mean that a measured one needs."""
+    return noiseless_motion(intended(run).motor, run.period_s)
 
 
 def _loses(data: MotionData, moved: MeasuredMotion) -> float:

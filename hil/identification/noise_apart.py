@@ -26,7 +26,7 @@ from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, NoiseApart
 from hil.identification.derivatives import MeasuredMotion, later_motion
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.intended_motion import intended
+from hil.identification.intended_motion import intended_motion
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
 from hil.identification.plain_model import PlainModel, plain_columns
@@ -46,27 +46,26 @@ def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Data
 
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel, smoothed: bool) -> NoiseApart:
     own = measured_motion(run)
-    moved, rows = own.moved if smoothed else measured_motion(intended(run)).moved, own.sliding(plain.slowest)
-    needed, taps, gain = np.where(rows, plain.predict(moved), run.torque), np.ones(1), 1.0
+    moved, rows = own.moved if smoothed else intended_motion(run), own.sliding(plain.slowest)
+    springs, taps, gain, window = bool(reference.bench.axis.SPRINGS), np.ones(1), 1.0, 0
+    needed = plain.predict(moved)
+    needed = np.where(rows, needed, run.torque) if springs else needed
     smooth = _driven(replace(run, motor=moved.position), needed)
     measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
-    noise, window = {name: measured[name] - free[name] for name in measured}, 0
+    noise, of_reference = {name: measured[name] - free[name] for name in measured}, inertia(reference.resolved.bench)
     if rows.any():
-        of_model = plain.predict(own.moved)
-        beyond = np.where(rows, run.torque - of_model, 0.0)
-        taps, left = _whitened(beyond, moved, rows, plain, run.period_s / data.observer_s)
-        if reference.bench.axis.SPRINGS:
-            seen = reference.blocks(_driven(smooth, needed + left), data.observer_s, rests=run)
-            noise["motor"] = seen["motor"] - free["motor"]
-        else:  # through the mean of the motion: what it takes off an acceleration is a torque that every twin lacks
-            window = own.window
-            smooth = _driven(smooth, needed + np.where(rows, own.torque - of_model, 0.0))
-            seen = free = reference.blocks(smooth, data.observer_s, rests=run)
-            noise = {name: measured[name] - free[name] for name in measured}
-            noise["motor"] = np.zeros(run.motor.size)
-        gain = rms(measured["motor"][rows]) / max(rms(filtered(seen["motor"][rows], [rows], taps)), 1e-300)
-    of_reference = inertia(reference.resolved.bench), taps, gain, free["motor"], window
-    return NoiseApart(smooth, rows, noise, measured, *of_reference)
+        of_model, a = plain.predict(own.moved), run.period_s / data.observer_s
+        taps, left = _whitened(np.where(rows, run.torque - of_model, 0.0), moved, rows, plain, a)
+        if springs:
+            noise["motor"] = (
+                reference.blocks(_driven(smooth, needed + left), data.observer_s, rests=run)["motor"] - free["motor"]
+            )
+        else:
+            window, beyond = own.window, observed(np.where(rows, own.torque - of_model, 0.0), a)
+            noise["motor"] = -beyond * data.observer_s**2 / of_reference
+    apart = NoiseApart(smooth, rows, noise, measured, of_reference, taps, gain, window)
+    least = rms(apart.of("motor", free["motor"], of_reference)[rows]) if rows.any() else 0.0
+    return apart._replace(gain=rms(measured["motor"][rows]) / least) if least else apart
 
 
 def _driven(run: Measured, torque: FloatArray) -> Measured:
@@ -91,15 +90,14 @@ def _whitened(
 
 def smoothed_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:
     """Recordings with smoothed motion and, where the axis slides, the torque that the plain model needs for it."""
-    return tuple(_smoothed(run, run, plain) for run in runs)
+    return tuple(_smoothed(run, measured_motion(run).moved, plain) for run in runs)
 
 
 def intended_runs(runs: Sequence[Measured], plain: PlainModel) -> tuple[Measured, ...]:
     """The same with the intended motion."""
-    return tuple(_smoothed(run, intended(run), plain) for run in runs)
+    return tuple(_smoothed(run, intended_motion(run), plain) for run in runs)
 
 
-def _smoothed(run: Measured, moves: Measured, plain: PlainModel) -> Measured:
-    moved = measured_motion(moves).moved
+def _smoothed(run: Measured, moved: MeasuredMotion, plain: PlainModel) -> Measured:
     torque = np.where(measured_motion(run).sliding(plain.slowest), plain.predict(moved), run.torque)
     return _driven(replace(run, motor=moved.position), torque)

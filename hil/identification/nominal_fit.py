@@ -53,20 +53,16 @@ def fit_nominal_parameters(data: Dataset, evaluations: int = _SECOND, deadline_s
     """Fit the nominal parameters alone, first with a robust loss; fits from it have the same deadline.
 
     If the fit misses more torque than the bench file, or a mass ended at a bound, it is repeated with the masses of the
-    bench file, and with its springs, whose damper may stand for friction or play behind them. The fit that misses the
-    least torque is taken.
+    bench file, and the fit that misses less torque is taken.
     """
     estimator, begin = Estimator(data, deadline_s=deadline_s), Hypothesis(data.bench)
     fit = estimator.fit(begin, soft=SOFT, evaluations=_FIRST).refit(evaluations)
-    axis = data.bench.axis
-    stuck = set(fit.at_bound) & set(axis.MASSES)
+    masses = [index for index, name in enumerate(begin.nominal) if name in data.bench.axis.MASSES]
+    stuck = set(fit.at_bound) & set(data.bench.axis.MASSES)
     if not stuck and fit.missed_torque <= estimator.evaluate(begin).missed_torque:
         return fit
-    fits = [fit]
-    for names in filter(None, (axis.MASSES, axis.SPRINGS)):
-        kept = [index for index, name in enumerate(begin.nominal) if name in names]
-        fits.append(estimator.fit(begin, soft=SOFT, evaluations=_FIRST, fixed=kept).refit(evaluations, fixed=kept))
-    return min(fits, key=lambda fit: fit.missed_torque)
+    kept = estimator.fit(begin, soft=SOFT, evaluations=_FIRST, fixed=masses).refit(evaluations, fixed=masses)
+    return min(fit, kept, key=lambda fit: fit.missed_torque)
 
 
 def require_finite(fit: Fit) -> None:

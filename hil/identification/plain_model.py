@@ -112,9 +112,14 @@ def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judge
     )
 
 
-def _window(position: FloatArray, noise: float, period_s: float) -> int:
+def noiseless_motion(position: FloatArray, period_s: float) -> MeasuredMotion:
+    """Motion (n,) of a position that no sensor measured: its mean is over a few rows, where it has no noise at all."""
+    return matched_motion(position, period_s, _window(position, _noise(position)[1], period_s, 0.0))
+
+
+def _window(position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S) -> int:
     """Rows of the shortest window that passes little noise: longer ones leave less motion between reversals."""
-    window = best = max(round(SMOOTH_S / period_s) | 1, 3)
+    window = best = max(round(shortest_s / period_s) | 1, 3)
     least = np.inf
     while least == np.inf or (window <= position.size // 4 and window * period_s <= LONGEST_S):
         inner = slice(window, -window) if position.size > 3 * window else slice(None)

@@ -29,7 +29,7 @@ from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion, matched_motion
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.intended_motion import intended
+from hil.identification.intended_motion import intended_motion
 from hil.identification.noise_apart import intended_runs, smoothed_runs
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries
@@ -226,7 +226,7 @@ def _motions(data: Dataset, channel: str, smooth: bool) -> list[list[MeasuredMot
     """
     if channel != TORQUE:
         return []
-    found = [[measured_motion(intended(run)).moved for run in data.runs]]
+    found = [[intended_motion(run) for run in data.runs]]
     for more in (1, 2) if smooth else ():
         each = [(run, more * (measured_motion(run).window - 1) + 1) for run in data.runs]
         found.append([matched_motion(run.motor, run.period_s, window) for run, window in each])

@@ -98,7 +98,7 @@ def _torque_panels(diagnosis: Diagnosis, run: Measured, data: Dataset) -> list[P
     An effect below the noise of a position shows here.
     """
     plain, unit = fit_plain(data), diagnosis.given_bench.axis.drive_unit
-    if plain is None or not diagnosis.result.torque_left:
+    if plain is None or not data.observability.torque_measured:
         return []
     own, lacking = measured_motion(run), list[FloatArray]()
     for fit in (reference_fit(diagnosis), diagnosis.final):

@@ -229,6 +229,19 @@ def test_a_panel_of_channels_that_show_nothing_is_left_out(monkeypatch: pytest.M
     assert "Phase of motion" in titles
 
 
+def test_residuals_show_the_torque_that_a_term_takes_up() -> None:
+    """Cogging: the measured torque, and what of it lacks where the axis slides, before and after."""
+    diagnosis = diagnosis_of("cogging_torque")
+    run = diagnosis.train.runs[0]
+    measured, lacking = location.residual_panels(diagnosis, run)[-2:]
+    before, after = (line.values for line in lacking.lines)
+    amplitude = diagnosis.final.terms[0].values[0]
+    assert measured.unit == lacking.unit == "N m"
+    assert np.max(np.abs(before)) == pytest.approx(amplitude, rel=0.5)
+    assert np.std(after) < 0.2 * np.std(before)
+    assert not before[: run.evaluated.start].any()
+
+
 def test_cogging_of_a_linear_motor_is_drawn_over_its_way() -> None:
     """Without a lead 2 pi of its angle are 1 m: 40 cycles are a pitch of 25 mm."""
     linear = load_bench("emps").model_copy()

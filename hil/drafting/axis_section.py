@@ -13,21 +13,14 @@ from hil.recording.recording import Recording
 
 # Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
-_LEAST_SHARE = 0.02  # of the inertia, on either side of a spring
 
 
 class AxisDraft(NamedTuple):
-    """A drafted section: keys with values, those whose values are not known, and what of them is told."""
+    """A drafted section: its kind, its keys with values, and what the owner of the axis should check."""
 
     model: str
     values: list[BenchValue]
-    guessed: tuple[str, ...] = ()
-    told: str = ""
-
-    @property
-    def unsure(self) -> list[str]:
-        """What the owner of the axis should check."""
-        return [f"{', '.join(self.guessed)}: told are {self.told}"] if self.guessed else []
+    unsure: tuple[str, ...] = ()
 
 
 def draft_axis(
@@ -45,8 +38,8 @@ def draft_axis(
     if turns and deflection is None and _in_volts(recording) and plant.viscous.significant:
         return AxisDraft("dc_motor", _dc_motor(plant, lead))
     if turns:
-        return _turning(plant, transmission, deflection, lead)
-    return _screw(plant, transmission, deflection, lead)
+        return _turning(plant, deflection, _sagging(plant, transmission), lead)
+    return _screw(plant, deflection, lead)
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
@@ -60,26 +53,22 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
     return None
 
 
-def _screw(
-    plant: PlantValues, transmission: TransmissionValues | None, deflection: Estimate | None, lead: Estimate
-) -> AxisDraft:
+def _screw(plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> AxisDraft:
     mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
     inertia = f"motor and screw included: inertia {digits(plant.inertia.value)} kg m^2 at the motor"
     values = [BenchValue("lead_m", lead.value, f"m per revolution, +-{lead.std_error:.2g}", lead.how)]
-    if transmission is None or deflection is None:
+    if deflection is None:
         values += [estimated("mass_kg", mass, "kg", inertia), *_rotary_friction(plant)]
         return AxisDraft("rigid", values)
-    share, why = _load_share(plant, transmission, deflection, lead)
-    table, rotor = _guess(mass, share), digits(1e-4 * (2.0 * pi / lead.value) ** 2)
-    split = f"a rotor of 1e-4 kg m^2 counts {rotor} kg"
-    masses = [
-        estimated("motor_mass_kg", _guess(mass, 1.0 - share), "kg", f"the rest of {digits(mass.value)} kg; {split}"),
-        estimated("table_mass_kg", table, "kg", f"{why}; {inertia}"),
+    half, rotor = _half(mass), digits(1e-4 * (2.0 * pi / lead.value) ** 2)
+    split = f"half of {digits(mass.value)} kg: the split is not told; a rotor of 1e-4 kg m^2 counts {rotor} kg"
+    elastic = [
+        estimated("motor_mass_kg", half, "kg", split),
+        estimated("table_mass_kg", half, "kg", f"the other half; {inertia}"),
+        estimated("stiffness_n_m", _stiffness(half, deflection), "N/m", "for this split"),
     ]
-    spring = estimated("stiffness_n_m", _stiffness(table, deflection), "N/m", "for this split")
-    keys = (*(one.key for one in masses), spring.key)
     told = "the sum of the masses and table mass over stiffness"
-    return AxisDraft("two_mass", [*values, *masses, spring, *_rotary_friction(plant)], keys, told)
+    return AxisDraft("two_mass", [*values, *elastic, *_rotary_friction(plant)], _unsure(elastic, told))
 
 
 def _in_volts(recording: Recording) -> bool:
@@ -102,61 +91,32 @@ def _dc_motor(plant: PlantValues, lead: Estimate) -> list[BenchValue]:
     ]
 
 
-def _turning(
-    plant: PlantValues, transmission: TransmissionValues | None, deflection: Estimate | None, lead: Estimate
-) -> AxisDraft:
-    gear, sag = gear_of(lead), _sagging(plant, transmission)
+def _turning(plant: PlantValues, deflection: Estimate | None, sag: Estimate | None, lead: Estimate) -> AxisDraft:
+    gear = gear_of(lead)
     values, friction = [estimated("gear_ratio", gear, "motor per load")], _rotary_friction(plant)
-    if transmission is None or (sag is None and deflection is None):
+    motor = _half(plant.inertia)
+    load = motor.scaled(gear.value**2)
+    stiffness = sag or (None if deflection is None else _stiffness(load, deflection))
+    if stiffness is None:
         inertia = estimated("inertia_kg_m2", plant.inertia, "kg m^2 at the motor")
         return AxisDraft("rotary", [*values, inertia, *friction])
-    share, why = _load_share(plant, transmission, deflection, lead, sag)
-    load = _guess(plant.inertia.scaled(gear.value**2), share)
-    inertias = [
-        estimated("motor_inertia_kg_m2", _guess(plant.inertia, 1.0 - share), "kg m^2 at the motor", "the rest"),
-        estimated("load_inertia_kg_m2", load, "kg m^2 at the load", why),
+    elastic = [
+        estimated("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
+        estimated("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
+        estimated("stiffness_n_m_rad", stiffness, "N m/rad"),
     ]
-    keys, told = tuple(one.key for one in inertias), "the sum of the inertias at the motor"
-    if sag is not None:
-        return AxisDraft("rotary_two_mass", [*values, *inertias, _spring(sag), *friction], keys, told)
-    assert deflection is not None
-    spring, told = _spring(_stiffness(load, deflection)), f"{told} and load inertia over stiffness"
-    return AxisDraft("rotary_two_mass", [*values, *inertias, spring, *friction], (*keys, spring.key), told)
+    told = "the sum of the inertias at the motor and load inertia over stiffness"
+    return AxisDraft("rotary_two_mass", [*values, *elastic, *friction], _unsure(elastic, told))
 
 
-def _spring(stiffness: Estimate) -> BenchValue:
-    return estimated("stiffness_n_m_rad", stiffness, "N m/rad")
+def _unsure(elastic: list[BenchValue], told: str) -> tuple[str, ...]:
+    return (f"{', '.join(one.key for one in elastic)}: told are {told}",)
 
 
-def _load_share(
-    plant: PlantValues,
-    transmission: TransmissionValues,
-    deflection: Estimate | None,
-    lead: Estimate,
-    stiffness: Estimate | None = None,
-) -> tuple[float, str]:
-    """Share of the inertia that is taken for the load's, and why.
-
-    With a `stiffness` k it is k D of the deflection over acceleration D. Else the split is not told, but not all of it
-    can be: what the second encoder differs by between directions, 2 f F / k with the Coulomb friction F, of which the
-    load has the share f, is at most that of f = 1. Half of it is taken, and no more than half of the inertia.
-    """
-    motor_per_load = 2.0 * pi / lead.value
-    total, friction = plant.inertia.value * motor_per_load**2, plant.coulomb.value * motor_per_load
-    lost, share, why = abs(transmission.friction_m.value), 0.5, "half of the sum: the split is not told"
-    if stiffness is not None and deflection is not None:
-        share, why = stiffness.value * deflection.value / total, "stiffness times deflection over acceleration"
-    elif deflection is not None and transmission.friction_m.significant and plant.coulomb.significant:
-        felt = 0.5 * max(friction, 0.0) * deflection.value / lost / total
-        if felt < share:
-            share, why = felt, "the split is not told; with this one half of the friction acts on the load"
-    return min(max(share, _LEAST_SHARE), 1.0 - _LEAST_SHARE), why
-
-
-def _guess(total: Estimate, share: float) -> Estimate:
-    """Share of a sum whose split is not identifiable; its standard error is the share itself."""
-    part = total.scaled(share)
-    return replace(part, std_error=part.value)
+def _half(total: Estimate) -> Estimate:
+    """Half of a sum whose split is not identifiable; its standard error is the half itself."""
+    half = total.scaled(0.5)
+    return replace(half, std_error=half.value)
 
 
 def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:

@@ -73,7 +73,7 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
     plant, transmission, turns = told.plant, told.transmission, told.turns
     ratio = 1.0 if told.lead is None else told.lead.value / (2.0 * pi)
     axis = draft_axis(recording, plant, transmission, turns, told.lead)
-    draft = BenchDraft(recording.name, recording.kind, axis, unsure=axis.unsure)
+    draft = BenchDraft(recording.name, recording.kind, axis, unsure=[*axis.unsure])
     draft.control, draft.control_why, close = loop_values(recording, ratio)
     if close and _is_sampled(recording, plant):
         gains = ", ".join(f"{one.key} {one.shown}" for one in draft.control if one.key in _GAINS)

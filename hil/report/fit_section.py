@@ -43,8 +43,8 @@ def fit_section(page: Page, diagnosis: Diagnosis, folder: Path) -> None:
     run = (*diagnosis.held_out.runs, *diagnosis.train.runs)[0]
     save(diagnosis.plot("residuals"), folder / "residuals.png")
     page.text(
-        f"Measured - twin on {run.name}, before and after; the band is the noise floor (residuals.png). Torque is shown "
-        "where the axis slides: an effect below the noise of a position is seen there."
+        f"Measured - twin on {run.name}, before and after; the band is the noise floor (residuals.png). Torque is "
+        "shown where the axis slides: an effect below the noise of a position is seen there."
     )
     page.plot(plots.over_time(run.time_s, residual_panels(diagnosis, run)))
     if result.torque_left:

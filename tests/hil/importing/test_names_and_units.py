@@ -42,7 +42,8 @@ def test_names_of_a_list_are_those_of_the_columns(tmp_path: Path, kind: str) -> 
 
 def test_only_a_complete_list_in_turn_is_one() -> None:
     told = listed_names(["Channel1,PosRef,um", "Channel2,IqAct,A"], ",", 2)
-    assert told is not None and told.names == ("PosRef", "IqAct")
+    assert told is not None
+    assert told.names == ("PosRef", "IqAct")
     assert listed_names(["ch 1: x", "ch 3: y"], ";", 2) is None
     assert listed_names(["ch 2: y", "ch 1: x"], ";", 2) is None
     assert listed_names(["ch1 pos;ch2 torque"], ";", 2) is None  # a row of names

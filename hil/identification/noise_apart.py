@@ -38,16 +38,15 @@ from hil.identification.whitening import RANK, filtered, whitening_filter
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
     """The recordings of a data set with the noise of their torque and motion apart, by the twin of a reference.
 
-    The motion is the intended one; beside a second encoder, which the measured motion drives, the smoothed one.
+    The motion is the intended one; of an axis with springs, whose table follows the measured motion, the smoothed one.
     """
-    smoothed = any(run.table_m.size for run in data.runs)
-    return replace(data, apart=tuple(_apart(data, run, reference, plain, smoothed) for run in data.runs))
+    return replace(data, apart=tuple(_apart(data, run, reference, plain) for run in data.runs))
 
 
-def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel, smoothed: bool) -> NoiseApart:
-    own = measured_motion(run)
-    moved, rows = own.moved if smoothed else intended_motion(run), own.sliding(plain.slowest)
-    springs, taps, gain, window = bool(reference.bench.axis.SPRINGS), np.ones(1), 1.0, 0
+def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel) -> NoiseApart:
+    own, springs = measured_motion(run), bool(reference.bench.axis.SPRINGS)
+    moved, rows = own.moved if springs else intended_motion(run), own.sliding(plain.slowest)
+    taps, gain, window = np.ones(1), 1.0, 0
     needed = plain.predict(moved)
     needed = np.where(rows, needed, run.torque) if springs else needed
     smooth = _driven(replace(run, motor=moved.position), needed)

@@ -110,13 +110,20 @@ def _scaled(base: Fit, term: Term) -> Term | None:
     seen = sizes([base.hypothesis.with_term(one) for one in spanning(term)], base)
     if not seen:
         return None
-    told = combined(term, [one.told.value for one in min(seen, key=_least)])
+    # noise in a shape makes its size too small: of the ways that tell it the one with the largest
+    clear = [own for own in seen if _least(own) < math.log(CRITERIA.significance)]
+    way = max(clear, key=_largest) if clear else min(seen, key=_least)
+    told = combined(term, [one.told.value for one in way])
     values, parameters = list(told.values), BY_ID[term.effect].parameters
     for strength, *_ in pairs(term):
         if not values[strength] >= parameters[strength].low:
             return None
         values[strength] = min(values[strength], parameters[strength].high)
     return replace(told, values=tuple(values))
+
+
+def _largest(own: Sequence[Size]) -> float:
+    return sum(one.told.value**2 for one in own)
 
 
 def _least(own: Sequence[Size]) -> float:

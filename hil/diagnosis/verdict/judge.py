@@ -24,7 +24,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.inference import bic_gain
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import is_load
-from hil.identification.torque_left import fit_plain, mismatch_left, needed_torque
+from hil.identification.torque_left import fit_plain, left_by_twin, mismatch_left, needed_torque
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Block
 
@@ -55,6 +55,10 @@ def judge(tested: Tested) -> Judged:
     named = of_plant is Verdict.MISSING_PHYSICS
     open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
+    alone = structure_left(refit.fit, held_out) if named and _drifts(beside) else ()
+    of_clocks = _clocks_need_less(alone, refit.fit, final, held_out)
+    if of_clocks:
+        of_plant, named, open_ones, beside = Verdict.UNEXPLAINED, False, not searched.stopped_at, alone
     moves, whole = any(isinstance(one.question.change, MomentOfChange) for one in beside), refit.fit
     if open_ones or (moves and not searched.stopped_at):
         whole = _with_loads(refit.fit, final)
@@ -64,7 +68,8 @@ def judge(tested: Tested) -> Judged:
     if change and change.explains_all:
         of_plant = Verdict.AXIS_CHANGED
     verdict = law.verdict(of_plant)
-    is_part = verdict is Verdict.UNEXPLAINED and not change and explains_part(searched.nominal, final, held_out)
+    absorbed = of_clocks or change
+    is_part = verdict is Verdict.UNEXPLAINED and not absorbed and explains_part(searched.nominal, final, held_out)
     nominal = refit.fit
     if not is_part and of_plant is not Verdict.MISSING_PHYSICS:
         as_given = of_plant is Verdict.NO_MISMATCH and given_stands(searched.given, held_out)
@@ -160,9 +165,23 @@ def told_apart(nominal: Fit) -> bool:
 
 def _is_drift(change: Change, beside: Sequence[Dependence]) -> bool:
     """True if a delay alone differs from part to part, and does so as one of two clocks that run apart."""
-    steady = (one.question.change for one in beside if isinstance(one.question.change, SteadyChange))
-    drifts = any(one.coefficient == LATENESS for one in steady)
-    return drifts and {one.name for one in change.summary.parameters} == {DELAY}
+    return bool(_drifts(beside)) and {one.name for one in change.summary.parameters} == {DELAY}
+
+
+def _drifts(beside: Sequence[Dependence]) -> list[Dependence]:
+    """Those of two clocks that run apart."""
+    steady = [(one, one.question.change) for one in beside if isinstance(one.question.change, SteadyChange)]
+    return [one for one, change in steady if change.coefficient == LATENESS]
+
+
+def _clocks_need_less(alone: Sequence[Dependence], without: Fit, named: Fit, held_out: Dataset) -> bool:
+    """True if two clocks that run apart leave less torque of all recordings than the names do, which absorb them."""
+    plain = fit_plain(without.data) if _drifts(alone) else None
+    if plain is None:
+        return False
+    every = held_out.over((*without.data.runs, *held_out.runs))
+    before, after = (left_by_twin(fit.hypothesis, every, plain) or 0.0 for fit in (without, named))
+    return (1.0 - max(one.explained for one in _drifts(alone))) * before**2 < after**2
 
 
 def _needs_less_torque(change: Change, named: Fit) -> bool:

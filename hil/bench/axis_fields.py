@@ -44,7 +44,9 @@ class AxisSection(BenchSection):
 
     @model_validator(mode="after")
     def _held_is_refitted(self) -> Self:
-        require_held(self.held, self.NOMINAL)
+        others = [name for name in self.held if name not in self.NOMINAL]
+        if others:
+            raise FieldError(("held",), f"given {', '.join(others)}, allowed {', '.join(self.NOMINAL)}")
         if not self.refitted:
             raise FieldError(("held",), "given every key that a diagnosis refits, allowed all but one")
         return self
@@ -53,13 +55,6 @@ class AxisSection(BenchSection):
     def refitted(self) -> tuple[str, ...]:
         """Parameters that a diagnosis refits: `NOMINAL` without those held."""
         return tuple(name for name in self.NOMINAL if name not in self.held)
-
-
-def require_held(held: tuple[str, ...], allowed: tuple[str, ...]) -> None:
-    """Raise FieldError unless each key that is held is one that a diagnosis refits."""
-    others = [name for name in held if name not in allowed]
-    if others:
-        raise FieldError(("held",), f"given {', '.join(others)}, allowed {', '.join(allowed)}")
 
 
 class Driven(AxisSection):

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hil.bench.axis_fields import BenchSection, require_held
+from hil.bench.axis_fields import BenchSection
 from hil.bench.axis_models import Axis, OneMass, model_of
 from hil.bench.compensation_section import CompensationSection
 from hil.bench.control_section import Control, ControlSection, UnknownControl, with_law
@@ -35,7 +35,6 @@ class MechanismEntry(BenchSection):
     effect: str = Field(description="id of a mechanism, as the reference of mechanisms lists them")
     variant: str = Field("", description="its form; absent: the first one")
     parameters: dict[str, float] = Field(description="name -> value in SI")
-    held: tuple[str, ...] = Field((), description="names of parameters whose values a diagnosis keeps")
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -59,7 +58,6 @@ class MechanismEntry(BenchSection):
                     ("parameters", parameter.name),
                     f"given {value:g}, allowed {parameter.low:g} to {parameter.high:g} {parameter.dimension.value}",
                 )
-        require_held(self.held, tuple(self.parameters))
         return self
 
     def active(self) -> Active:

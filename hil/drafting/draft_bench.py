@@ -74,6 +74,8 @@ def _draft_parts(recordings: tuple[Recording, ...]) -> BenchDraft:
     ratio = 1.0 if told.lead is None else told.lead.value / (2.0 * pi)
     axis = draft_axis(recording, plant, transmission, turns, told.lead)
     draft = BenchDraft(recording.name, recording.kind, axis, unsure=[*axis.unsure])
+    if axis.model == "dc_motor":
+        draft.notes.append("the voltage stands in the torque channels, 1 N m for 1 V: torques of a diagnosis are volts")
     draft.control, draft.control_why, close = loop_values(recording, ratio)
     if close and _is_sampled(recording, plant):
         gains = ", ".join(f"{one.key} {one.shown}" for one in draft.control if one.key in _GAINS)

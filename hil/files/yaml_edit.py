@@ -92,6 +92,9 @@ def with_items(text: str, key: str, items: str) -> str:
     found = next((node for name, node in _root(text).value if name.value == key), None)
     if found is None:
         return f"{text.rstrip()}\n{key}:\n{_indented(items, 2)}"
+    if isinstance(found, yaml.ScalarNode):  # all items are comments
+        begin = _line_end(text, found.start_mark.index)
+        return _applied(text, [_Edit(begin, 2, begin, "\n" + _indented(items, 2).rstrip("\n"))])
     if found.flow_style and found.value:
         raise ValueError(f"{key}: a list in brackets")
     edits = [_Edit(found.start_mark.index, 0, found.end_mark.index, "")] if found.flow_style else []

@@ -15,9 +15,10 @@ from hil.bench.bench_file import Bench
 from hil.errors import InputError
 from hil.identification.measured import Measured
 from hil.identification.plain_model import fit_plain_model
-from hil.identification.residual_scales import inertia
+from hil.identification.residual_scales import factor_of_masses, with_masses
 from hil.identification.torque_left import measured_motion
 
+_LIGHTEST = 1e-3  # factor on masses, where held ones have more inertia than the axis
 ALIKE = 1.3  # factor on the inertia up to which a recording is of the axis; a heavy workpiece adds less
 FITTED, LOOKED_AT = 4, 12  # recordings that are fitted, of the first ones of an axis
 
@@ -76,10 +77,8 @@ def own_inertia(run: Measured) -> float | None:
 
 
 def with_inertia(bench: Bench, value: float) -> Bench:
-    """The bench with its masses scaled to an inertia of the whole axis [kg m^2, kg]."""
-    factor = value / inertia(bench)
-    scaled = {name: factor * getattr(bench.axis, name) for name in bench.axis.MASSES}
-    return bench.model_copy(update={"axis": bench.axis.model_copy(update=scaled)})
+    """The bench with its masses, but for those held, scaled to an inertia of the whole axis [kg m^2, kg]."""
+    return with_masses(bench, max(factor_of_masses(bench, value), _LIGHTEST))
 
 
 def _alike(value: float, other: float) -> bool:

@@ -117,7 +117,7 @@ def coordinate_of(name: str, parameter: Parameter, start: float) -> Coordinate:
 
 
 def known_values(entries: Sequence[MechanismEntry]) -> list[tuple[int, str, float]]:
-    """Index of the entry, name and value of each parameter of a bench's mechanisms, but of those held and of events.
+    """Index of the entry, name and value of each parameter that a bench file gives for its mechanisms, but for events.
 
     In the order of the entries; of one entry in the order of its mechanism's parameters.
     """
@@ -125,7 +125,7 @@ def known_values(entries: Sequence[MechanismEntry]) -> list[tuple[int, str, floa
         (index, name, entry.parameters[name])
         for index, entry in enumerate(entries)
         for name in BY_ID[entry.effect].names
-        if name in entry.parameters and name not in entry.held and BY_ID[entry.effect].over_time is None
+        if name in entry.parameters and BY_ID[entry.effect].over_time is None
     ]
 
 

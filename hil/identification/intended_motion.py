@@ -30,7 +30,29 @@ _LOST = 0.005  # of the variance of the acceleration: an inertia is a quarter of
 @lru_cache(maxsize=16)
 def intended(run: Measured) -> Measured:
     """The run with its intended motor position (n,)."""
-    data = motion_data(run.motor, run.torque, run.period_s, run.evaluated)
+    motor = _by_set_points(run)
+    return replace(run, motor=_slow(run, _data(run)) if motor is None else motor)
+
+
+def intended_motion(run: Measured) -> MeasuredMotion:
+    """The intended motion of a run (n,) with its derivatives."""
+    return motion_of_set_points(run) or _data(intended(run)).moved
+
+
+def motion_of_set_points(run: Measured) -> MeasuredMotion | None:
+    """The motion (n,) that set-points make, without the mean that a measured one needs; None if they do not tell it."""
+    motor = _by_set_points(run)
+    return None if motor is None else noiseless_motion(motor, run.period_s)
+
+
+def _data(run: Measured) -> MotionData:
+    return motion_data(run.motor, run.torque, run.period_s, run.evaluated)
+
+
+@lru_cache(maxsize=16)
+def _by_set_points(run: Measured) -> FloatArray | None:
+    """Motor position (n,) that the set-points make; None if they do not tell it."""
+    data = _data(run)
     command = run.position_command_m - np.mean(run.position_command_m)
     size = float(command @ command)
     scale = float(command @ run.motor) / size if size > 0.0 else 0.0
@@ -38,13 +60,8 @@ def intended(run: Measured) -> Measured:
     if follows and scale != 0.0 and white_noise(scale * command) <= run.noise.motor:
         motor = _of_set_points(run)
         if _loses(data, matched_motion(motor, run.period_s, data.window)) < _ANOTHER:
-            return replace(run, motor=motor)
-    return replace(run, motor=_slow(run, data))
-
-
-def intended_motion(run: Measured) -> MeasuredMotion:
-    """The intended motion of a run (n,) with its derivatives, not through the mean that a measured one needs."""
-    return noiseless_motion(intended(run).motor, run.period_s)
+            return motor
+    return None
 
 
 def _loses(data: MotionData, moved: MeasuredMotion) -> float:

@@ -1,19 +1,20 @@
 """Recordings below the noise: no hypothesis gains by passing less of the noise of their torque and motion.
 
-    r(theta) = w * [e0 + K (e(theta; quiet) J(theta) / J(theta0) - e0)],  e0 = e(theta0; quiet)    without a spring
-    r(theta) = w * [e(theta; smooth) J(theta) / J(theta0) + e(theta0; left) - e(theta0; smooth)]      with springs
-    r(theta) = e(theta; .) + [e(theta0; measured) - e(theta0; .)]                 other channels, as the motor
-    r(theta) = e(theta0; measured)                                                rows that do not slide
+    r(theta) = g w * [K e(theta; smooth) J(theta) / J(theta0) + e(K left)]           without a spring
+    r(theta) = g w * [e(theta; smooth) J(theta) / J(theta0) + e(theta0; left) - e(theta0; smooth)]    with springs
+    r(theta) = e(theta; smooth) + [e(theta0; measured) - e(theta0; smooth)]          other channels than the motor
+    r(theta) = e(theta0; measured)                                                   rows that do not slide
 
-e: residuals block by block; theta0: a reference; J: inertia; K: the mean of the smoothed motion. Smooth is a recording
-with a motion without the noise of its encoder and the torque that the plain model needs for it; quiet has also what
-that model leaves of the measured torque through K, left all that it leaves by generalised least squares. The noise of a
-torque drives a twin, and least squares of e(theta; measured) prefers an axis that answers less: more inertia, a
-resonance, a lag (errors in variables; W. E. Deming, Statistical Adjustment of Data, 1943). Times the inertia, e of a
-rigid axis is the torque that it lacks, with the same noise for every hypothesis; torque and motion pass the same mean,
-and so does what a hypothesis changes. A resonance would pass less of the noise: there it goes through the reference
-alone. So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain model leaves,
-so that slow errors do not hide a faster effect. About a reversal smoothed motion tells nothing.
+e: residuals block by block; theta0: a reference; J: inertia. Smooth is a recording with a motion without the noise of
+its encoder and the torque that the plain model needs for it; left is what that model leaves of the measured torque,
+with springs by generalised least squares. The noise of a torque drives a twin, and least squares of e(theta; measured)
+prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical
+Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for
+every hypothesis: what is left stands there as it is, through the mean K that the measured motion of the plain model
+needs, and so does what a hypothesis lacks. A resonance would pass less of the noise: there it goes through the
+reference alone. So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain
+model leaves, so that slow errors do not hide a faster effect, and g keeps the rms of e(theta0; measured). About a
+reversal smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, NoiseApart
 from hil.identification.derivatives import MeasuredMotion, later_motion
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.intended_motion import intended_motion
+from hil.identification.intended_motion import intended_motion, motion_of_set_points
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
 from hil.identification.plain_model import PlainModel, plain_columns
@@ -45,7 +46,8 @@ def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Data
 
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel) -> NoiseApart:
     own, springs = measured_motion(run), bool(reference.bench.axis.SPRINGS)
-    moved, rows = own.moved if springs else intended_motion(run), own.sliding(plain.slowest)
+    moved = None if springs else motion_of_set_points(run)
+    moved, rows = moved or own.moved, own.sliding(plain.slowest)
     taps, gain, window = np.ones(1), 1.0, 0
     needed = plain.predict(moved)
     needed = np.where(rows, needed, run.torque) if springs else needed

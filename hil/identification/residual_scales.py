@@ -44,6 +44,19 @@ def inertia(bench: Bench) -> float:
     return float(modes.shape[modes.motor, 0] ** -2)
 
 
+def with_masses(bench: Bench, factor: float) -> Bench:
+    """The bench with its masses, but for those held, times a factor."""
+    axis = bench.axis
+    scaled = {name: factor * getattr(axis, name) for name in axis.MASSES if name not in axis.held}
+    return bench.model_copy(update={"axis": axis.model_copy(update=scaled)})
+
+
+def factor_of_masses(bench: Bench, wanted: float) -> float:
+    """Factor of `with_masses` that gives the axis an inertia [motor unit]; 1 if all masses are held."""
+    light, heavy = inertia(bench), inertia(with_masses(bench, 2.0))
+    return 1.0 + (wanted - light) / (heavy - light) if heavy > light else 1.0
+
+
 def scales(
     run: Measured, bench: Bench, observer_s: float, torque_accuracy: float, discrepancy: float
 ) -> dict[str, FloatArray]:

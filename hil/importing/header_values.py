@@ -29,7 +29,7 @@ class HeaderValue:
 class _Statement:
     """Words, the number that follows them, the texts that may be its unit, the whole text, and the last phrase.
 
-    `of_motor`: it is a way per turn of the motor.
+    `of_motor`: it is a way, or counts, per turn of the motor. `weak`: what is said otherwise goes before it.
     """
 
     words: str
@@ -38,6 +38,7 @@ class _Statement:
     text: str
     phrase: str = ""
     of_motor: bool = False
+    weak: bool = False
 
 
 _NUMBER = re.compile(r"(?<![\w.])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
@@ -64,10 +65,15 @@ _DEVIATES = re.compile(
     r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"
 )
 # behind a number, what it is: 8192 per motor turn, 250 samples per second, 5 ms per line
-_PER_TURN = re.compile(r"^ *(?:steps|pulses|increments|inkremente|counts)? ?(?:per|pro) (?:motor )?(?:turn|rev|umdr)")
-_OF_COUNTS = re.compile(r"\b(encoder|increments?|counts|steps|geber|inkremente|codeur|motor) *[(,:]? *$")
-_PER_SECOND = re.compile(r"^ *(?:samples|rows|lines|points) (?:per|a) s(?:ec|\b)")
-_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row|sample|point)\b")
+_PER_TURN = re.compile(
+    r"^ *(?:(?:steps|pulses|increments|inkremente|counts|impulse) )?(?:per|pro) (motor )?(?:turn|rev\w*|umdrehung)"
+    r"(?! of| der| des|/)"
+)
+_OF_COUNTS = re.compile(r"encoder|resolver|increment|inkrement|geber|codeur")
+_OF_MOTOR = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho)\b")  # not of its encoder
+_PER_SECOND = re.compile(r"^ *(?:samples|rows) per s(?:ec|\b)")
+_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row|sample)\b")
+_THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+")  # or a decimal comma
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
@@ -86,7 +92,7 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
         units = one.units if any(one.units) else (*one.units, None)
         if told := next((known for unit in units if (known := _constant(one, unit))), None):
             by_words, constant, value = told
-            rank = one.of_motor, by_words
+            rank = one.of_motor, by_words and not one.weak
             found.setdefault(constant, {}).setdefault(rank, []).append(HeaderValue(value, one.text))
     best = {constant: ranked[max(ranked)] for constant, ranked in found.items()}
     return {constant: values[0] for constant, values in best.items() if len({one.value for one in values}) == 1}
@@ -110,7 +116,8 @@ def _statements(line: str) -> Iterator[_Statement]:
         value, behind = _number(match[0]), folded[match.end() : end]
         if value is None or _is_list(folded, matches[index:], value):
             continue
-        yield from _told_behind(before, value, behind, header_text(line))
+        if not _THOUSANDS.fullmatch(match[0]):
+            yield from _told_behind(before, value, behind, header_text(line))
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
             yield lead
         if re.search(r"[^\W\d]", before):
@@ -132,12 +139,13 @@ def _words_before(before: str, value: float, behind: str, line: str) -> _Stateme
 
 def _told_behind(before: str, value: float, text: str, line: str) -> Iterator[_Statement]:
     """The statement of a number behind which its words stand, of counts per turn, a rate or a period."""
-    if _PER_TURN.match(text) and _OF_COUNTS.search(before):
-        yield _Statement("", value, ("counts/rev",), line)
+    turn = _PER_TURN.match(text)
+    if turn and _OF_COUNTS.search(before) and not _OF_MOTOR.search(before):
+        yield _Statement("", value, ("counts/rev",), line, of_motor=bool(turn[1]))
     if _PER_SECOND.match(text):
-        yield _Statement("sample rate", value, ("hz",), line)
+        yield _Statement("sample rate", value, ("hz",), line, weak=True)
     if period := _PER_ROW.match(text):
-        yield _Statement("sample time", value, (period[1],), line)
+        yield _Statement("sample time", value, (period[1],), line, weak=True)
 
 
 def _lead_behind(before: str, value: float, text: str, line: str) -> _Statement | None:

@@ -45,9 +45,11 @@ def listed_names(lines: Sequence[str], delimiter: str, width: int, counted: bool
                 given.append((index, int(match[1] or match[2]), name))
     for first, several in ((0, width), (1, width), *(((1, width - 1),) if counted else ())):
         numbered = [one for one in given if first <= one[1] < first + several]
-        parts = [re.split(r"\s{2,}|\s*[\t;|,]\s*", name, maxsplit=1) for _, _, name in numbered]
-        behind = {part[0]: _size(part[1]) for part in parts if len(part) == 2}
-        told = len(behind) == several and sum(map(bool, behind.values())) > several / 2
+        told, behind = False, dict[str, str]()
+        for apart in (r"\s{2,}|\s*[\t;|]\s*", r"\s*,\s*"):
+            parts = [re.split(apart, name, maxsplit=1) for _, _, name in numbered]
+            behind = behind if told else {part[0]: _size(part[1]) for part in parts if len(part) == 2}
+            told = len(behind) == several and sum(map(bool, behind.values())) > several / 2
         names = tuple(behind) if told else tuple(name for _, _, name in numbered)
         in_turn = [number for _, number, _ in numbered] == list(range(first, first + several))
         if in_turn and len(set(names)) == several > 1:

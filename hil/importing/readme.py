@@ -61,21 +61,35 @@ def _listed(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, 
     """Words and unit of columns in a list of them, a line each: "q_mot   motor encoder, degrees of the motor"."""
     told = {}
     for name in names:
-        begin = re.compile(rf"[\s*•-]*{re.escape(name)}(?:\s*[:=]\s*|\s+[-–]\s+|\s{{2,}}|\t\s*)(?=\S)(.*)")
-        rest = next((match[1] for line in lines if name and (match := begin.match(line))), "")
-        phrases = [part.strip() for part in re.split(r"[,;()]", rest) if part.strip()]
-        if unit := next((unit for part in phrases if (unit := _unit_at_an_end(part))), ""):
-            told[name] = ("" if phrases[0] == unit else phrases[0], unit)
+        begin = re.compile(rf"[\s*•-]*{re.escape(name)}(?:\s*:\s*|\s+[-–]\s+|\s{{2,}}|\t\s*)(?=\S)(.*)")
+        for rest in (match[1] for line in lines if name and (match := begin.match(line))):
+            phrases = [part.strip() for part in re.split(r"[,;()]", rest) if part.strip()]
+            unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
+            if unit:
+                told[name] = ("" if phrases[0] == unit else phrases[0], unit)
+                break
     return told if len(told) > 1 else {}
 
 
 def _unit_at_an_end(phrase: str) -> str:
-    """Unit with which a phrase without numbers begins or ends, "in mm", "degrees of the joint"; "" without one.
+    """Unit with which a phrase without numbers begins or ends, "torque in N m", "degrees of the joint"; "" without one.
 
-    A letter is a unit at the end only, and "in" a word.
+    A letter is a unit at the end only; "in", "second" and a unit beside another one, or beside "per", are words.
     """
     words = phrase.split()
-    if re.search(r"\d", phrase):
-        return ""
-    ends = [words[0], *words[-1:]] if len(words[0]) > 1 else words[-1:]
-    return next((word for word in ends if word != "in" and unit_named(word)), "")
+    for take in (3, 2, 1) if not re.search(r"\d", phrase) else ():
+        first, last = " ".join(words[:take]), " ".join(words[-take:])
+        if _is_unit(last) and not _part_of_unit(words[:-take][-1:]):
+            return last
+        if len(first) > 1 and _is_unit(first) and not _part_of_unit(words[take : take + 1]):
+            return first
+    return ""
+
+
+def _is_unit(text: str) -> bool:
+    return text not in ("in", "second") and unit_named(text) is not None
+
+
+def _part_of_unit(beside: Sequence[str]) -> bool:
+    """True if the word beside a unit makes it a part of another one."""
+    return any(word in ("per", "/") or _is_unit(word) for word in beside)

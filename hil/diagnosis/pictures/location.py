@@ -14,7 +14,6 @@ from hil.diagnosis.turning import speed_unit
 from hil.diagnosis.wording import channel_names, spoken, title
 from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
-from hil.identification.dataset import Dataset
 from hil.identification.derivatives import matched
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
@@ -89,21 +88,24 @@ def residual_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
         )
         lines = Line("before", first, COMMAND, broad=True), Line("after", second, SIMULATED)
         panels.append(Panel(f"{spoken(recorded)}\n{title(entry.mode)}", entry.unit, lines, floor))
-    return [*panels, *_torque_panels(diagnosis, run, diagnosis.held_out if held_out else diagnosis.train)]
+    return [*panels, *_torque_panels(diagnosis, run)]
 
 
-def _torque_panels(diagnosis: Diagnosis, run: Measured, data: Dataset) -> list[Panel]:
+def _torque_panels(diagnosis: Diagnosis, run: Measured) -> list[Panel]:
     """The measured torque, and what of it the twin lacks before and after where the axis slides: means over a window.
 
-    An effect below the noise of a position shows here.
+    An effect below the noise of a position shows here. None where nothing slides, or a twin does not hold the motion.
     """
-    plain, unit = fit_plain(data), diagnosis.given_bench.axis.drive_unit
+    data, unit = diagnosis.train, diagnosis.given_bench.axis.drive_unit
+    plain = fit_plain(data)
     if plain is None or not data.observability.torque_measured:
         return []
     own, lacking = measured_motion(run), list[FloatArray]()
     for fit in (reference_fit(diagnosis), diagnosis.final):
         (series,) = needed_torque(fit.hypothesis, data.over((run,)), plain)
-        mean = matched(np.nan_to_num(series.left), own.window)
+        if not np.isfinite(series.left).all():
+            return []
+        mean = matched(series.left, own.window)
         lacking.append(_judged(np.where(series.rows & series.clear, mean, 0.0), run))
     lines = Line("before", lacking[0], COMMAND, broad=True), Line("after", lacking[1], SIMULATED)
     over = quantity(own.window * run.period_s, "s")

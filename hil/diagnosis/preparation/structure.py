@@ -26,11 +26,11 @@ _ONE = (
 
 
 def as_one_inertia(prepared: Prepared) -> Prepared | None:
-    """The recordings beside a twin of one inertia, the sum of all; None if it is one already."""
+    """The recordings beside a twin of one inertia, the sum of all; None if it is one, or all of it is held."""
     bench = prepared.bench
-    if not bench.axis.SPRINGS:
+    one = rigid(bench) if bench.axis.SPRINGS else bench
+    if one is bench or not one.axis.refitted:
         return None
-    one = rigid(bench)
     data = prepare_dataset(prepared.train.runs, one)
     notes = (*prepared.notes, _ONE)
     return replace(prepared, bench=one, train=data, held_out=data.over(prepared.held_out.runs), notes=notes)

@@ -11,7 +11,6 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from hil.arrays import FloatArray, SingleArray
-from hil.bench.bench_file import Bench
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.initial_values import likenesses, other_variants
 from hil.diagnosis.search.score_test import Candidate, offered
@@ -22,7 +21,7 @@ from hil.identification.inference import by_energy, refuted
 from hil.identification.levenberg_marquardt import damped_step, normal_equations, robust_loss
 from hil.identification.nominal_fit import SOFT
 from hil.identification.parallel import POOL, in_parallel
-from hil.identification.residual_scales import TORQUE_ACCURACY, inertia
+from hil.identification.residual_scales import TORQUE_ACCURACY, factor_of_masses, inertia
 from hil.identification.terms import compatible
 from hil.identification.window_fit import fit_windows
 from hil.twin.library import BY_ID
@@ -62,13 +61,7 @@ def given_points(base: Fit) -> list[FloatArray]:
     if not axis.SPRINGS:
         return [given]
 
-    def heavier(factor: float) -> Bench:
-        return bench.model_copy(
-            update={"axis": axis.model_copy(update={name: factor * getattr(axis, name) for name in axis.MASSES})}
-        )
-
-    light, heavy, wanted = inertia(bench), inertia(heavier(2.0)), inertia(base.bench)
-    factor = max(1.0 + (wanted - light) / (heavy - light), 1.0 / TRUST)
+    factor = max(factor_of_masses(bench, inertia(base.bench)), 1.0 / TRUST)
     hidden = hypothesis.x.copy()
     for index, coordinate in enumerate(hypothesis.coordinates[: hypothesis.nominal_count]):
         if coordinate.name in axis.MASSES:

@@ -56,7 +56,7 @@ def judge(tested: Tested) -> Judged:
     open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
     alone = structure_left(refit.fit, held_out) if named and _drifts(beside) else ()
-    of_clocks = _clocks_need_less(alone, refit.fit, final, held_out)
+    of_clocks = _clocks_need_less((refit.fit, alone), (final, beside), held_out)
     if of_clocks:
         of_plant, named, open_ones, beside = Verdict.UNEXPLAINED, False, not searched.stopped_at, alone
     moves, whole = any(isinstance(one.question.change, MomentOfChange) for one in beside), refit.fit
@@ -174,14 +174,21 @@ def _drifts(beside: Sequence[Dependence]) -> list[Dependence]:
     return [one for one, change in steady if change.coefficient == LATENESS]
 
 
-def _clocks_need_less(alone: Sequence[Dependence], without: Fit, named: Fit, held_out: Dataset) -> bool:
-    """True if two clocks that run apart leave less torque of all recordings than the names do, which absorb them."""
-    plain = fit_plain(without.data) if _drifts(alone) else None
+def _clocks_need_less(
+    without: tuple[Fit, Sequence[Dependence]], named: tuple[Fit, Sequence[Dependence]], held_out: Dataset
+) -> bool:
+    """True if clocks that run apart leave less torque of all recordings alone than beside names, which absorb them."""
+    fit, alone = without
+    plain = fit_plain(fit.data) if _drifts(alone) else None
     if plain is None:
         return False
-    every = held_out.over((*without.data.runs, *held_out.runs))
-    before, after = (left_by_twin(fit.hypothesis, every, plain) or 0.0 for fit in (without, named))
-    return (1.0 - max(one.explained for one in _drifts(alone))) * before**2 < after**2
+    every, left = held_out.over((*fit.data.runs, *held_out.runs)), list[float]()
+    for one, found in (without, named):
+        missed = left_by_twin(one.hypothesis, every, plain)
+        if missed is None:
+            return False
+        left.append((1.0 - max(drift.explained for drift in _drifts(found))) * missed**2)
+    return left[0] < left[1]
 
 
 def _needs_less_torque(change: Change, named: Fit) -> bool:

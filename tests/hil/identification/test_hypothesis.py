@@ -57,14 +57,12 @@ def test_values_of_known_mechanisms_are_fitted_and_numbered() -> None:
 
 @pytest.mark.parametrize("held", [("table_mass_kg",), OWNER.axis.NOMINAL[1:]])
 def test_values_that_the_owner_holds_are_not_refitted(held: tuple[str, ...]) -> None:
-    """Of the axis and of a mechanism; the others take up what the bench has wrong."""
-    load = MechanismEntry(effect="constant_load", parameters={"load_torque_n_m": 0.2}, held=("load_torque_n_m",))
+    """The others take up what the bench has wrong."""
     wrong = {"table_mass_kg": 1.1 * OWNER.axis.table_mass_kg, "held": held}
-    owner = OWNER.model_copy(update={"axis": OWNER.axis.model_copy(update=wrong), "mechanisms": (load,)})
+    owner = OWNER.model_copy(update={"axis": OWNER.axis.model_copy(update=wrong)})
     found = fit_nominal(dataset([take(recorded(OWNER, LOAD), owner)], owner))
     assert {one.name for one in found.parameters} == set(OWNER.axis.NOMINAL) - set(held)
     assert all(getattr(found.bench.axis, name) == getattr(owner.axis, name) for name in held)
-    assert found.bench.mechanisms == (load,)
 
 
 def test_differences_are_wide_where_a_nut_may_chatter() -> None:

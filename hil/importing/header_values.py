@@ -70,9 +70,10 @@ _PER_TURN = re.compile(
     r"(?! of| der| des|/)"
 )
 _OF_COUNTS = re.compile(r"encoder|resolver|increment|inkrement|geber|codeur")
-_OF_MOTOR = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho)\b")  # not of its encoder
+_NO_COUNTS = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho|quadratur\w*|x ?4)\b")
 _PER_SECOND = re.compile(r"^ *(?:samples|rows) per s(?:ec|\b)")
-_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row|sample)\b")
+_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row)\b")
+_OF_FILE = re.compile(r"\b(file|rows?|record\w*|header|separated|comma|tabs?)\b|\.\w{2,5}\b")
 _THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+")  # or a decimal comma
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
@@ -140,9 +141,9 @@ def _words_before(before: str, value: float, behind: str, line: str) -> _Stateme
 def _told_behind(before: str, value: float, text: str, line: str) -> Iterator[_Statement]:
     """The statement of a number behind which its words stand, of counts per turn, a rate or a period."""
     turn = _PER_TURN.match(text)
-    if turn and _OF_COUNTS.search(before) and not _OF_MOTOR.search(before):
+    if turn and _OF_COUNTS.search(before) and not _NO_COUNTS.search(before + text):
         yield _Statement("", value, ("counts/rev",), line, of_motor=bool(turn[1]))
-    if _PER_SECOND.match(text):
+    if _PER_SECOND.match(text) and _OF_FILE.search(before):
         yield _Statement("sample rate", value, ("hz",), line, weak=True)
     if period := _PER_ROW.match(text):
         yield _Statement("sample time", value, (period[1],), line, weak=True)

@@ -13,6 +13,7 @@ from hil.importing.header_values import header_values
 from hil.importing.unit_lines import described
 from hil.importing.units import unit_named
 
+_WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
 _LONGEST = 1_000_000  # bytes: no README is as long
 
 
@@ -74,7 +75,7 @@ def _listed(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, 
 def _unit_at_an_end(phrase: str) -> str:
     """Unit with which a phrase without numbers begins or ends, "torque in N m", "degrees of the joint"; "" without one.
 
-    A letter is a unit at the end only; "in", "second" and a unit beside another one, or beside "per", are words.
+    A letter is a unit at the end only, and one beside another, or beside "per", is none.
     """
     words = phrase.split()
     for take in (3, 2, 1) if not re.search(r"\d", phrase) else ():
@@ -87,7 +88,7 @@ def _unit_at_an_end(phrase: str) -> str:
 
 
 def _is_unit(text: str) -> bool:
-    return text not in ("in", "second") and unit_named(text) is not None
+    return text not in _WORDS and unit_named(text) is not None
 
 
 def _part_of_unit(beside: Sequence[str]) -> bool:

@@ -77,9 +77,9 @@ def test_one_encoder_and_torque_make_a_rotary_axis(tmp_path: Path) -> None:
 
 
 def test_a_voltage_makes_a_dc_motor_in_volts(tmp_path: Path) -> None:
-    bench = load_bench(
-        drafted(tmp_path, renamed(AXIS, t="time_s", angle="motor_angle_rad", torque="voltage_command_V"))
-    )
+    path = drafted(tmp_path, renamed(AXIS, t="time_s", angle="motor_angle_rad", torque="voltage_command_V"))
+    bench = load_bench(path)
+    assert "torques of a diagnosis are volts" in path.read_text()
     assert bench.axis.model == "dc_motor"
     assert bench.axis.voltage_constant_v_s_rad == pytest.approx(VISCOUS_N_M_S_RAD, rel=0.1)
     assert bench.axis.time_constant_s == pytest.approx(INERTIA_KG_M2 / VISCOUS_N_M_S_RAD, rel=0.1)

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from hil.files.yaml_edit import YamlChange, with_changes
+from hil.files.yaml_edit import YamlChange, with_changes, with_items, without_item
 
 BLOCK = "axis:\n  table_mass_kg: 80.0   # owner\ncontrol:\n  law: unknown\n"
 
@@ -26,3 +26,12 @@ def test_a_comment_on_a_key_in_a_mapping_that_the_file_lacks_tells_its_whole_pat
     changed = with_changes(BLOCK, [YamlChange(("axis", "friction", "coulomb_n_m"), None, "not told")])
     assert changed == BLOCK.replace("# owner\n", "# owner\n  # friction.coulomb_n_m: not told\n")
     assert yaml.safe_load(changed) == yaml.safe_load(BLOCK)
+
+
+def test_items_go_below_a_list_of_which_all_are_comments() -> None:
+    text = "name: a\nmechanisms:\n  - effect: backlash\n    parameters: {gap_m: 1.0e-6}\n# end\n"
+    text = without_item(text, "mechanisms", 0, "doubtful")
+    text = with_items(text, "mechanisms", "- effect: constant_load\n  parameters: {load_torque_n_m: 0.1}\n")
+    told = yaml.safe_load(text)
+    assert told == {"name": "a", "mechanisms": [{"effect": "constant_load", "parameters": {"load_torque_n_m": 0.1}}]}
+    assert "backlash" in text

@@ -70,6 +70,8 @@ AXIS = axis()
         ("Encoder 20000 steps per turn, absolute", Constant.COUNTS, 20000.0),
         ("Two encoders: motor (16384 per motor turn) and a scale", Constant.COUNTS, 16384.0),
         ("separated by blanks, 250 samples per second", Constant.RATE, 250.0),
+        ("Tacho encoder: 60 pulses per rev; motor encoder: 8192 per motor turn", Constant.COUNTS, 8192.0),
+        ("Stepper, 200 steps per turn, servo encoder 8192 counts per rev", Constant.COUNTS, 8192.0),
         ("decimal comma, 5 ms per line", Constant.RATE, 200.0),
         ("One sample every 250 microseconds", Constant.RATE, 4000.0),
         ("Torque const. 0.5 Nm/A", Constant.TORQUE, 0.5),
@@ -88,6 +90,16 @@ def test_a_line_gives_a_constant_in_si(line: str, constant: Constant, value: flo
     [
         "Fecha;12/03/2026",
         "6 pole pairs, 6 per motor turn",
+        "Torque ripple of the motor: 24 per motor turn",
+        "i = 90, motor 90 per turn of the table",
+        "Encoder 5000 steps per turn of the gearbox output",
+        "Stepping motor 200 steps per turn",
+        "Encoder 2500 steps per turn, before quadrature",
+        "Temperature logger: 10 samples per second",
+        "1,000 samples per second in this file",
+        "cable lead is 2 m long",
+        "dwell interval is 0.2 s",
+        "drill time 2 ms per point",
         "a ring encoder on the table (3.6 million steps per turn)",
         "Motor encoder on the gear, 90 per table turn",
         "pole pitch 24 mm",
@@ -155,3 +167,8 @@ def test_rows_of_an_axis_at_rest_are_kept_where_no_column_is_a_stamp(tmp_path: P
     assert draft.clock.rate_hz == 1000.0
     assert draft.clock.time_s.size == rows
     assert not [note for note in draft.unsure if "left out" in note]
+
+
+def test_a_rate_among_other_words_gives_way_to_one_that_is_named() -> None:
+    found = header_values(["Sampling rate 1 kHz.", "other.csv: 10 samples per second"], {})
+    assert found[Constant.RATE].value == 1000.0

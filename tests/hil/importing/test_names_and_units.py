@@ -44,6 +44,9 @@ def test_only_a_complete_list_in_turn_is_one() -> None:
     told = listed_names(["Channel1,PosRef,um", "Channel2,IqAct,A"], ",", 2)
     assert told is not None
     assert told.names == ("PosRef", "IqAct")
+    told = listed_names(["1: Weg, Motor  mm", "2: Kraft, Stempel  N"], ";", 2)
+    assert told is not None
+    assert told.names == ("Weg, Motor", "Kraft, Stempel")
     assert listed_names(["ch 1: x", "ch 3: y"], ";", 2) is None
     assert listed_names(["ch 2: y", "ch 1: x"], ";", 2) is None
     assert listed_names(["ch1 pos;ch2 torque"], ";", 2) is None  # a row of names

@@ -12,7 +12,7 @@ from hil.commands.import_ import import_
 from hil.errors import InputError
 from hil.explanation import explain
 from hil.importing.draft_map import draft_map
-from hil.importing.readme import FileHints
+from hil.importing.readme import FileHints, _listed
 from hil.recording.recording import read_recording
 
 AXIS = axis()
@@ -106,3 +106,22 @@ def test_a_unit_stands_among_the_words_of_a_column(tmp_path: Path) -> None:
     entries = {one.channel: one.entry for one in draft_map(source, readme=readme).channels}
     units = {entries[name]["column"]: entries[name]["unit"] for name in entries}
     assert units == {"q_cmd": "deg", "q_mot": "deg", "i": "A"}
+
+
+@pytest.mark.parametrize(
+    ("words", "unit"),
+    [
+        ("motor torque in N m", "N m"),
+        ("torque, Newton meters of the motor", "Newton meters"),
+        ("motor speed, degrees per second", ""),
+        ("revolutions per minute", ""),
+        ("second encoder", ""),
+        ("position of the first turn", ""),
+        ("angle, degrees of the joint", "degrees"),
+        ("5 um steps", ""),
+    ],
+)
+def test_a_part_of_a_unit_is_none(words: str, unit: str) -> None:
+    told = _listed([f" a   {words}", " b - time s", " c   see below", " c   force, N"], ["a", "b", "c"])
+    assert told.get("a", ("", ""))[1] == unit
+    assert (told["b"][1], told["c"][1]) == ("s", "N")

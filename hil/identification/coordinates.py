@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hil.bench.axis_fields import RATIOS, AxisSection
+from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import MechanismEntry
 from hil.identification.derivatives import SMOOTH_S
 from hil.twin.library import BY_ID
@@ -93,9 +93,8 @@ class Coordinate:
         return min(step if self.edge else max(step, 1e-3), 0.1 * (self.high - self.low) / self.scale)
 
 
-def axis_coordinate(name: str, axis: AxisSection, inertia: float) -> Coordinate:
+def axis_coordinate(name: str, value: float, inertia: float) -> Coordinate:
     """The coordinate of a nominal parameter of an axis, by its value in the bench file and the inertia at the motor."""
-    value = float(getattr(axis, name))
     if name in RATIOS:
         return Coordinate(name, max(value, 0.01), True, 1e-4, 0.9, least_step=1e-3)
     if value > 0.0:

@@ -142,7 +142,7 @@ class Hypothesis:
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Coordinates of x."""
         axis, inertia = self.bench.axis, float(self.bench.axis.physics().chain.inertia_kg_m2.sum())
-        coordinates = [axis_coordinate(name, axis, inertia) for name in axis.refitted]
+        coordinates = [axis_coordinate(name, float(getattr(axis, name)), inertia) for name in axis.refitted]
         if DELAY in self.nominal:
             coordinates.append(delay_coordinate(self.bench.torque_delay_s or 0.0, self.bench.period_s))
         coordinates += self._known

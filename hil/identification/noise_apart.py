@@ -49,8 +49,7 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     moved = None if springs else motion_of_set_points(run)
     moved, rows = moved or own.moved, own.sliding(plain.slowest)
     taps, gain, window = np.ones(1), 1.0, 0
-    needed = plain.predict(moved)
-    needed = np.where(rows, needed, run.torque) if springs else needed
+    needed = np.where(rows, plain.predict(moved), run.torque) if springs else plain.predict(moved)
     smooth = _driven(replace(run, motor=moved.position), needed)
     measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
     noise, of_reference = {name: measured[name] - free[name] for name in measured}, inertia(reference.resolved.bench)

@@ -90,6 +90,8 @@ def corrections_section(page: Page, diagnosis: Diagnosis) -> None:
     page.heading("Parameters of the bench")
     if result.not_identifiable:
         page.text(f"Not identifiable from this motion: {', '.join(result.not_identifiable)}.")
+    if held := diagnosis.given_bench.axis.held:
+        page.text(f"Held as the bench file gives them: {', '.join(map(spoken_key, held))}.")
     if rows:
         page.table(("parameter", "unit", "bench file", "fitted", "standard error", "change"), rows, left=(0, 1))
 

@@ -177,7 +177,10 @@ def _drifts(beside: Sequence[Dependence]) -> list[Dependence]:
 def _clocks_need_less(
     without: tuple[Fit, Sequence[Dependence]], named: tuple[Fit, Sequence[Dependence]], held_out: Dataset
 ) -> bool:
-    """True if clocks that run apart leave less torque of all recordings alone than beside names, which absorb them."""
+    """True if clocks that run apart leave less torque of all recordings alone than beside names, which absorb them.
+
+    Of each the fit, and what it leaves that depends on something.
+    """
     fit, alone = without
     plain = fit_plain(fit.data) if _drifts(alone) else None
     if plain is None:

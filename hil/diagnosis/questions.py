@@ -11,11 +11,11 @@ from hil.diagnosis.result import CLOCK, MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.least_squares import Columns
 from hil.identification.periods import refined_period, strongest_periods
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import BINS, ResidualSeries
-from hil.identification.torque_left import measured_motion
 from hil.quantities import digits, quantity
 
 _ROWS = 4.0  # per period of a line: less is an alias

@@ -32,9 +32,10 @@ from hil.diagnosis.wording import by_chance
 from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.plain_model import PlainModel
 from hil.identification.structure import ResidualSeries, Structure, offset, structure
-from hil.identification.torque_left import fit_plain, measured_motion, needed_torque, torque_deviation
+from hil.identification.torque_left import fit_plain, needed_torque, torque_deviation
 from hil.quantities import digits, quantity, reading_unit
 
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's

@@ -23,10 +23,11 @@ from hil.fleet.quantities import Told
 from hil.identification.dataset import prepare_dataset
 from hil.identification.derivatives import noise_gains
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.least_squares import BLOCKS, Estimate, LinearFit, least_squares
 from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, SlowestSliding
-from hil.identification.torque_left import left_by_twin, measured_motion
+from hil.identification.torque_left import left_by_twin
 
 _SLIDING = 0.02  # of the top speed, as in the plain model
 _BRAKES = 0.05  # of the greatest acceleration: below, an axis counts as braking

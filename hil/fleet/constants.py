@@ -13,10 +13,10 @@ import numpy as np
 
 from hil.bench.bench_file import Bench
 from hil.errors import InputError
+from hil.identification.intended_motion import measured_motion
 from hil.identification.measured import Measured
 from hil.identification.plain_model import fit_plain_model
 from hil.identification.residual_scales import factor_of_masses, with_masses
-from hil.identification.torque_left import measured_motion
 
 _LIGHTEST = 1e-3  # factor on masses, where held ones have more inertia than the axis
 ALIKE = 1.3  # factor on the inertia up to which a recording is of the axis; a heavy workpiece adds less

@@ -1,4 +1,4 @@
-"""The intended motion of a recording: without the noise of its encoder and without what pushes the axis.
+"""Motion of a recording: measured, and intended, without the noise of its encoder and without what pushes the axis.
 
     q = c s + sum_k h_k F_k(s) + w,    intended: q - w
 
@@ -31,12 +31,12 @@ _LOST = 0.005  # of the variance of the acceleration: an inertia is a quarter of
 def intended(run: Measured) -> Measured:
     """The run with its intended motor position (n,)."""
     motor = _by_set_points(run)
-    return replace(run, motor=_slow(run, _data(run)) if motor is None else motor)
+    return replace(run, motor=_slow(run, measured_motion(run)) if motor is None else motor)
 
 
 def intended_motion(run: Measured) -> MeasuredMotion:
     """The intended motion of a run (n,) with its derivatives."""
-    return motion_of_set_points(run) or _data(intended(run)).moved
+    return motion_of_set_points(run) or measured_motion(intended(run)).moved
 
 
 def motion_of_set_points(run: Measured) -> MeasuredMotion | None:
@@ -45,14 +45,16 @@ def motion_of_set_points(run: Measured) -> MeasuredMotion | None:
     return None if motor is None else noiseless_motion(motor, run.period_s)
 
 
-def _data(run: Measured) -> MotionData:
+@lru_cache(maxsize=32)
+def measured_motion(run: Measured) -> MotionData:
+    """Motion and torque of a run for the plain model."""
     return motion_data(run.motor, run.torque, run.period_s, run.evaluated)
 
 
 @lru_cache(maxsize=16)
 def _by_set_points(run: Measured) -> FloatArray | None:
     """Motor position (n,) that the set-points make; None if they do not tell it."""
-    data = _data(run)
+    data = measured_motion(run)
     command = run.position_command_m - np.mean(run.position_command_m)
     size = float(command @ command)
     scale = float(command @ run.motor) / size if size > 0.0 else 0.0

@@ -10,8 +10,8 @@ its encoder and the torque that the plain model needs for it; left is what that 
 with springs by generalised least squares. The noise of a torque drives a twin, and least squares of e(theta; measured)
 prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical
 Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for
-every hypothesis: what is left stands there as it is, through the mean K that the measured motion of the plain model
-needs, and so does what a hypothesis lacks. A resonance would pass less of the noise: there it goes through the
+every hypothesis. What is left enters as it was measured, through the mean K of the measured motion; what a hypothesis
+lacks passes the same mean. A resonance would pass less of the noise: there it goes through the
 reference alone. So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain
 model leaves, so that slow errors do not hide a faster effect, and g keeps the rms of e(theta0; measured). About a
 reversal smoothed motion tells nothing.
@@ -27,12 +27,12 @@ from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, NoiseApart
 from hil.identification.derivatives import MeasuredMotion, later_motion
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.intended_motion import intended_motion, motion_of_set_points
+from hil.identification.intended_motion import intended_motion, measured_motion, motion_of_set_points
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.residual_scales import inertia
-from hil.identification.torque_left import measured_motion, observed
+from hil.identification.torque_left import observed
 from hil.identification.whitening import RANK, filtered, whitening_filter
 
 

@@ -31,8 +31,9 @@ from hil.identification.dataset import Dataset
 from hil.identification.derivatives import matched, noise_gains
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.measured import Measured
-from hil.identification.plain_model import MotionData, PlainModel, SlowestSliding, fit_plain_model, motion_data
+from hil.identification.plain_model import MotionData, PlainModel, SlowestSliding, fit_plain_model
 from hil.identification.structure import ResidualSeries
 from hil.identification.twin_deviation import held_on_motor
 
@@ -217,9 +218,3 @@ def _share(
         return None
     deviation = torque_deviation([data], slowest) if deviation is None else deviation
     return float(np.sqrt(np.mean(left**2)) / deviation) if left.size and deviation > 0.0 else None
-
-
-@lru_cache(maxsize=32)
-def measured_motion(run: Measured) -> MotionData:
-    """Motion and torque of a run for the plain model."""
-    return motion_data(run.motor, run.torque, run.period_s, run.evaluated)

@@ -19,7 +19,8 @@ from hil.control.compensation import follow
 from hil.control.compensation_tables import pack
 from hil.diagnosis.diagnose import diagnose
 from hil.diagnosis.preparation.prepare import prepare
-from hil.identification.torque_left import fit_plain, measured_motion
+from hil.identification.intended_motion import measured_motion
+from hil.identification.torque_left import fit_plain
 from hil.motion.trajectory import plan
 from hil.validation.proof.draw.demo import PROVE
 

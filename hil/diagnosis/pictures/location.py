@@ -16,8 +16,9 @@ from hil.figures.drawing import WIDTH_IN, Drawing, style_axis
 from hil.figures.panels import COMMAND, DEVIATION, MEASURED, SIMULATED, Line, Panel
 from hil.identification.derivatives import matched
 from hil.identification.estimator import Fit
+from hil.identification.intended_motion import measured_motion
 from hil.identification.measured import Measured
-from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.identification.torque_left import fit_plain, needed_torque
 from hil.quantities import quantity
 
 if TYPE_CHECKING:

@@ -21,9 +21,10 @@ from hil.diagnosis.search.successive_halving import SECOND, equivalents, finish,
 from hil.identification.coefficient import log_tail
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
+from hil.identification.intended_motion import measured_motion
 from hil.identification.parallel import in_parallel
 from hil.identification.terms import Term, compatible
-from hil.identification.torque_left import fit_plain, measured_motion
+from hil.identification.torque_left import fit_plain
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Role
 

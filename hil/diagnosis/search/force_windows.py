@@ -25,12 +25,13 @@ from hil.diagnosis.wording import whole_name
 from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.least_squares import Estimate, LinearFit, least_squares
 from hil.identification.measured import Measured
 from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.identification.torque_left import fit_plain, needed_torque
 from hil.identification.whitening import RANK
 
 _STEPS = 200  # of the rows in order of time, between which edges are sought

@@ -29,12 +29,12 @@ from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion, matched_motion
 from hil.identification.estimator import Fit
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.intended_motion import intended_motion
+from hil.identification.intended_motion import intended_motion, measured_motion
 from hil.identification.noise_apart import intended_runs, smoothed_runs
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
 from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, measured_motion, quiet_motion
+from hil.identification.torque_left import fit_plain, quiet_motion
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.mechanism import Stage
 from hil.twin.parameter import Role

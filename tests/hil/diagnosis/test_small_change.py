@@ -15,8 +15,9 @@ from hil.diagnosis.moment_of_change import SteadyChange
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.structure_left import TORQUE, structure_left
 from hil.explanation import explain
+from hil.identification.intended_motion import measured_motion
 from hil.identification.nominal_fit import fit_nominal_parameters
-from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.identification.torque_left import fit_plain, needed_torque
 from hil.recording.recording import read_recording
 
 ROWS, AT = 9000, 4000

@@ -13,8 +13,9 @@ from hil.commands.import_ import import_
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.structure_left import TORQUE, Dependence, structure_left
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.nominal_fit import fit_nominal_parameters
-from hil.identification.torque_left import fit_plain, measured_motion, needed_torque
+from hil.identification.torque_left import fit_plain, needed_torque
 from hil.recording.recording import read_recording
 
 COLUMNS, LONG = axis(24_000), axis(48_000)

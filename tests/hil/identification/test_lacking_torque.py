@@ -12,8 +12,9 @@ from hil.bench.control_section import UnknownControl
 from hil.diagnosis.preparation.prepare import prepare
 from hil.identification.estimator import Estimator
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, lacking_torque, measured_motion
+from hil.identification.torque_left import fit_plain, lacking_torque
 
 KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})

@@ -16,10 +16,11 @@ from hil.diagnosis.search.event_detection import Event
 from hil.diagnosis.search.events_everywhere import with_events
 from hil.diagnosis.search.force_windows import strength_told, torque_over_time, torque_windows, windows_of
 from hil.identification.hypothesis import Hypothesis
+from hil.identification.intended_motion import measured_motion
 from hil.identification.measured import Measured, take
 from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term, Window
-from hil.identification.torque_left import fit_plain, measured_motion
+from hil.identification.torque_left import fit_plain
 
 OWNER = bench()
 TO_AND_FRO = [(0.06, 0.1), (0.0, 0.2), (0.04, 0.15), (0.0, 0.08)]

@@ -17,10 +17,11 @@ from hil.diagnosis.search.forward_selection import over
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.shape import log_chance_below_noise, log_chance_of_shape, sizes
 from hil.identification.estimator import Fit
+from hil.identification.intended_motion import measured_motion
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters
 from hil.identification.terms import Term
-from hil.identification.torque_left import fit_plain, measured_motion
+from hil.identification.torque_left import fit_plain
 
 KNOWN = bench()
 OWNER = KNOWN.model_copy(update={"control": UnknownControl(law="unknown")})

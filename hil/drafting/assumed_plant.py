@@ -12,12 +12,18 @@ ASSUMED = "assumed: no torque is recorded, which would tell it"
 
 
 def plant_or_assumed(
-    recordings: Sequence[Recording], transmission: TransmissionValues | None, load_ratio: float | None
+    recordings: Sequence[Recording],
+    transmission: TransmissionValues | None,
+    load_ratio: float | None,
+    nominal: Estimate | None,
 ) -> PlantValues:
-    """Values by `plant_values`; those of a usual motor, with errors as large, where two encoders are recorded alone."""
+    """Values by `plant_values`; those of a usual motor, with errors as large, where two encoders are recorded alone.
+
+    `nominal` is the inertia that the owner tells, for that of a usual motor.
+    """
     if any(one.axis.torque in one.columns for one in recordings) or transmission is None:
         return plant_values(recordings, load_ratio)
     inertia, viscous, coulomb = (
         Estimate(value, value, ASSUMED) for value in (_INERTIA_KG_M2, _VISCOUS_N_M_S_RAD, _COULOMB_N_M)
     )
-    return PlantValues(inertia, viscous, coulomb, Estimate(0.0, 0.0, ASSUMED), 0.0, None, None, None)
+    return PlantValues(nominal or inertia, viscous, coulomb, Estimate(0.0, 0.0, ASSUMED), 0.0, None, None, None)

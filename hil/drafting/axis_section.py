@@ -1,26 +1,33 @@
 """The section `axis` of a drafted bench file: its kind, masses, stiffness and friction, each with its error."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import hypot, pi
-from typing import NamedTuple
 
 from hil.drafting.bench_value import BenchValue, estimated
 from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.ratio_values import gear_of
+from hil.drafting.split import Split, split_of
 from hil.identification.least_squares import Estimate
 from hil.quantities import ROTARY_LEAD_M, digits, unit_of
 from hil.recording.recording import Recording
 
 # Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
+_STIFFNESS = ("stiffness_n_m", "stiffness_n_m_rad")
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 
 
-class AxisDraft(NamedTuple):
-    """A drafted section: its kind, its keys with values, and what the owner of the axis should check."""
+@dataclass(frozen=True)
+class AxisDraft:
+    """A drafted section: its kind, its keys with values, what the owner of the axis should check, and keys held.
+
+    `share_of_load` is the share of Coulomb friction that acts on the load of an axis with a spring; None: not told.
+    """
 
     model: str
     values: list[BenchValue]
     unsure: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+    share_of_load: Estimate | None = None
 
 
 def draft_axis(
@@ -37,9 +44,30 @@ def draft_axis(
     deflection = None if transmission is None else _deflection_s2(transmission)
     if turns and deflection is None and _in_volts(recording) and plant.viscous.significant:
         return AxisDraft("dc_motor", _dc_motor(plant, lead))
-    if turns:
-        return _turning(plant, deflection, _sagging(plant, transmission), lead)
-    return _screw(plant, deflection, lead)
+
+    def drafted(split: Split) -> AxisDraft:
+        if turns:
+            return _turning(plant, deflection, _sagging(plant, transmission), lead, split)
+        return _screw(plant, deflection, lead, split)
+
+    split = split_of(plant.inertia, recording, lead.value, turns)
+    axis = drafted(split)
+    share = _share_of_load(axis, plant, transmission, lead)
+    if share is not None and share.value > 1.0 and not split.told:  # a spring as stiff as that has a lighter load
+        axis = drafted(split.with_load(0.5 / share.value))
+        share = _share_of_load(axis, plant, transmission, lead)
+    return replace(axis, share_of_load=None if share is None else replace(share, value=min(share.value, 1.0)))
+
+
+def _share_of_load(
+    axis: AxisDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate
+) -> Estimate | None:
+    """Share of Coulomb friction on the load, by what the second encoder lags behind the motor's in each direction."""
+    stiffness = next((one.value for one in axis.values if one.key in _STIFFNESS), None)
+    if stiffness is None or transmission is None or not plant.coulomb.significant:
+        return None
+    lag = transmission.friction_m.scaled(-float(stiffness) * lead.value / (2.0 * pi) / plant.coulomb.value)
+    return replace(lag, how="friction over stiffness, or lost motion") if lag.significant and lag.value > 0.0 else None
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
@@ -53,22 +81,24 @@ def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:
     return None
 
 
-def _screw(plant: PlantValues, deflection: Estimate | None, lead: Estimate) -> AxisDraft:
-    mass = plant.inertia.scaled((2.0 * pi / lead.value) ** 2)
+def _screw(plant: PlantValues, deflection: Estimate | None, lead: Estimate, split: Split) -> AxisDraft:
+    factor = (2.0 * pi / lead.value) ** 2
+    mass = plant.inertia.scaled(factor)
     inertia = f"motor and screw included: inertia {digits(plant.inertia.value)} kg m^2 at the motor"
     values = [BenchValue("lead_m", lead.value, f"m per revolution, +-{lead.std_error:.2g}", lead.how)]
     if deflection is None:
         values += [estimated("mass_kg", mass, "kg", inertia), *_rotary_friction(plant)]
         return AxisDraft("rigid", values)
-    half, rotor = _half(mass), digits(1e-4 * (2.0 * pi / lead.value) ** 2)
-    split = f"half of {digits(mass.value)} kg: the split is not told; a rotor of 1e-4 kg m^2 counts {rotor} kg"
+    motor, table = split.motor.scaled(factor), split.load.scaled(factor)
+    how = f"{split.how}; the sum is {digits(mass.value)} kg; a rotor of 1e-4 kg m^2 counts {digits(1e-4 * factor)} kg"
     elastic = [
-        estimated("motor_mass_kg", half, "kg", split),
-        estimated("table_mass_kg", half, "kg", f"the other half; {inertia}"),
-        estimated("stiffness_n_m", _stiffness(half, deflection), "N/m", "for this split"),
+        estimated("motor_mass_kg", motor, "kg", how),
+        estimated("table_mass_kg", table, "kg", f"the rest; {inertia}"),
+        estimated("stiffness_n_m", _stiffness(table, deflection), "N/m", "for this split"),
     ]
     told = "the sum of the masses and table mass over stiffness"
-    return AxisDraft("two_mass", [*values, *elastic, *_rotary_friction(plant)], _unsure(elastic, told))
+    held = ("table_mass_kg",) if split.told else ()
+    return AxisDraft("two_mass", [*values, *elastic, *_rotary_friction(plant)], _unsure(elastic, told, split), held)
 
 
 def _in_volts(recording: Recording) -> bool:
@@ -91,32 +121,29 @@ def _dc_motor(plant: PlantValues, lead: Estimate) -> list[BenchValue]:
     ]
 
 
-def _turning(plant: PlantValues, deflection: Estimate | None, sag: Estimate | None, lead: Estimate) -> AxisDraft:
+def _turning(
+    plant: PlantValues, deflection: Estimate | None, sag: Estimate | None, lead: Estimate, split: Split
+) -> AxisDraft:
     gear = gear_of(lead)
     values, friction = [estimated("gear_ratio", gear, "motor per load")], _rotary_friction(plant)
-    motor = _half(plant.inertia)
-    load = motor.scaled(gear.value**2)
+    load = split.load.scaled(gear.value**2)
     stiffness = sag or (None if deflection is None else _stiffness(load, deflection))
     if stiffness is None:
         inertia = estimated("inertia_kg_m2", plant.inertia, "kg m^2 at the motor")
         return AxisDraft("rotary", [*values, inertia, *friction])
     elastic = [
-        estimated("motor_inertia_kg_m2", motor, "kg m^2 at the motor", "half of the sum: the split is not told"),
-        estimated("load_inertia_kg_m2", load, "kg m^2 at the load", "the other half"),
+        estimated("motor_inertia_kg_m2", split.motor, "kg m^2 at the motor", split.how),
+        estimated("load_inertia_kg_m2", load, "kg m^2 at the load", "the rest"),
         estimated("stiffness_n_m_rad", stiffness, "N m/rad"),
     ]
     told = "the sum of the inertias at the motor and load inertia over stiffness"
-    return AxisDraft("rotary_two_mass", [*values, *elastic, *friction], _unsure(elastic, told))
+    held = ("load_inertia_kg_m2",) if split.told else ()
+    return AxisDraft("rotary_two_mass", [*values, *elastic, *friction], _unsure(elastic, told, split), held)
 
 
-def _unsure(elastic: list[BenchValue], told: str) -> tuple[str, ...]:
-    return (f"{', '.join(one.key for one in elastic)}: told are {told}",)
-
-
-def _half(total: Estimate) -> Estimate:
-    """Half of a sum whose split is not identifiable; its standard error is the half itself."""
-    half = total.scaled(0.5)
-    return replace(half, std_error=half.value)
+def _unsure(elastic: list[BenchValue], told: str, split: Split) -> tuple[str, ...]:
+    keys = ", ".join(one.key for one in elastic)
+    return (f"{keys}: told are {told}{f'; {split.how}' if split.told else ''}",)
 
 
 def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:

@@ -19,7 +19,7 @@ from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
-from hil.twin.mechanisms import constant_load, gravity_torque
+from hil.twin.mechanisms import constant_load, gravity_torque, table_side_friction
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 _MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
@@ -127,11 +127,15 @@ def _torque_delay(recording: Recording, plant: PlantValues) -> BenchValue | None
 
 
 def _loads(draft: BenchDraft, plant: PlantValues) -> None:
-    """Constant torque, and gravity over the angle, as mechanisms of the bench: both are as common as friction."""
+    """Constant torque, gravity over the angle, and friction of the load as mechanisms: as common as friction."""
     if plant.offset_told:
         (name,) = (parameter.name for parameter in constant_load.MECHANISM.parameters)
         held = "a load, friction that differs by direction, or a zero of the drive"
         draft.mechanisms[constant_load.MECHANISM.id] = [estimated(name, plant.offset, "at the motor", held)]
+    if draft.axis.share_of_load is not None:
+        (name,) = (parameter.name for parameter in table_side_friction.MECHANISM.parameters)
+        share = estimated(name, draft.axis.share_of_load, "of the friction")
+        draft.mechanisms[table_side_friction.MECHANISM.id] = [share]
     if plant.gravity is not None and plant.gravity_angle is not None and plant.gravity.significant:
         torque, angle = (parameter.name for parameter in gravity_torque.MECHANISM.parameters)
         draft.mechanisms[gravity_torque.MECHANISM.id] = [

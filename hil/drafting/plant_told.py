@@ -11,6 +11,7 @@ from hil.channels import AxisKind
 from hil.drafting.assumed_plant import plant_or_assumed
 from hil.drafting.plant_values import PlantValues, TransmissionValues, plant_values, transmission_values
 from hil.drafting.ratio_values import lead_of
+from hil.drafting.split import nominal_sum
 from hil.errors import InputError
 from hil.identification.derived_channels import with_position
 from hil.identification.least_squares import Estimate
@@ -63,7 +64,8 @@ def plant_told(parts: tuple[Recording, ...]) -> PlantTold:
         return PlantTold(plant_values(parts), transmission, None, False)
     lead = lead_of(recording, transmission)
     turns = recording.metadata.get("lead_m") == ROTARY_LEAD_M or lead.value > LONGEST_LEAD_M
-    plant = plant_or_assumed(parts, transmission, lead.value / (2.0 * pi) if turns else None)
+    nominal = nominal_sum(recording, lead.value, turns)
+    plant = plant_or_assumed(parts, transmission, lead.value / (2.0 * pi) if turns else None, nominal)
     if plant.gravity_angle is not None and transmission is not None:  # it bends what the ratio is measured over
         transmission = transmission_values(recording, plant.gravity_angle.value)
         lead = lead_of(recording, transmission)

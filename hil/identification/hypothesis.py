@@ -26,7 +26,7 @@ from hil.identification.coordinates import (
     known_values,
     with_values,
 )
-from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
+from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset, NoiseApart
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
 from hil.identification.residuals import Residuals, differences
@@ -266,6 +266,13 @@ class Hypothesis:
         residuals["command"] = measured.torque_command - predicted.torque_command
         return residuals | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
 
+    def _without_noise(self, apart: NoiseApart, run: Measured, observer_s: float, fast: bool) -> dict[str, FloatArray]:
+        free, own = self.blocks(apart.smooth, observer_s, fast, rests=run), inertia(self.resolved.bench)
+        found = {name: apart.of(name, values, own) for name, values in free.items()}
+        if apart.followed is not None:
+            found["table"] = self.blocks(apart.followed, observer_s, fast, rests=run)["table"]
+        return found
+
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
         key = (data, closed, fast)
@@ -274,15 +281,8 @@ class Hypothesis:
             if closed:
                 channels = [differences(run.response, self.respond(run), bench, run.evaluated) for run in runs]
             elif data.apart:
-                free = [
-                    self.blocks(one.smooth, data.observer_s, fast, rests=run)
-                    for one, run in zip(data.apart, runs, strict=True)
-                ]
-                own = inertia(self.resolved.bench)
-                channels = [
-                    {name: one.of(name, values, own) for name, values in each.items()}
-                    for one, each in zip(data.apart, free, strict=True)
-                ]
+                pairs = zip(data.apart, runs, strict=True)
+                channels = [self._without_noise(one, run, data.observer_s, fast) for one, run in pairs]
             else:
                 channels = [self.blocks(run, data.observer_s, fast) for run in runs]
             self._done[key] = Residuals(data, tuple(channels))

@@ -2,8 +2,9 @@
 
     r(theta) = g w * [K e(theta; smooth) J(theta) / J(theta0) + e(K left)]           without a spring
     r(theta) = g w * [e(theta; smooth) J(theta) / J(theta0) + e(theta0; left) - e(theta0; smooth)]    with springs
+    r(theta) = e(theta; measured motion, torque of smooth)                           second encoder, with springs
     r(theta) = e(theta; smooth) + [e(theta0; measured) - e(theta0; smooth)]          other channels than the motor
-    r(theta) = e(theta0; measured)                                                   rows that do not slide
+    r(theta) = e(theta0; measured)                                                   other rows, that do not slide
 
 e: residuals block by block; theta0: a reference; J: inertia. Smooth is a recording with a motion without the noise of
 its encoder and the torque that the plain model needs for it; left is what that model leaves of the measured torque,
@@ -12,9 +13,10 @@ prefers an axis that answers less: more inertia, a resonance, a lag (errors in v
 Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for
 every hypothesis. What is left enters as it was measured, through the mean K of the measured motion; what a hypothesis
 lacks passes the same mean. A resonance would pass less of the noise: there it goes through the
-reference alone. So a fit is least squares of the torque; w whitens it by the autoregressive model of what the plain
-model leaves, so that slow errors do not hide a faster effect, and g keeps the rms of e(theta0; measured). About a
-reversal smoothed motion tells nothing.
+reference alone. The second encoder follows the motor as it was measured: a mean would take off the motion that tells
+load over stiffness and damping. So a fit is least squares of the torque; w whitens it by the autoregressive model of
+what the plain model leaves, so that slow errors do not hide a faster effect, and g keeps the rms of e(theta0;
+measured). About a reversal smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
@@ -63,7 +65,8 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
         else:
             window, beyond = own.window, observed(np.where(rows, own.torque - of_model, 0.0), a)
             noise["motor"] = -beyond * data.observer_s**2 / of_reference
-    apart = NoiseApart(smooth, rows, noise, measured, of_reference, taps, gain, window)
+    followed = _driven(run, needed) if springs and run.table_m.size else None
+    apart = NoiseApart(smooth, followed, rows, noise, measured, of_reference, taps, gain, window)
     least = rms(apart.of("motor", free["motor"], of_reference)[rows]) if rows.any() else 0.0
     return apart._replace(gain=rms(measured["motor"][rows]) / least) if least else apart
 

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hil.importing.lexicon import Constant, ConstantWords, lexicon, without_accents
+from hil.importing.nominal_values import mass_told
 from hil.importing.units import unit_named
+from hil.importing.values_behind import Statement, told_behind
 from hil.quantities import UNITS
 
 
@@ -25,23 +27,7 @@ class HeaderValue:
     text: str
 
 
-@dataclass(frozen=True)
-class _Statement:
-    """Words, the number that follows them, the texts that may be its unit, the whole text, and the last phrase.
-
-    `of_motor`: it is a way, or counts, per turn of the motor. `weak`: what is said otherwise goes before it.
-    """
-
-    words: str
-    number: float
-    units: tuple[str, ...]
-    text: str
-    phrase: str = ""
-    of_motor: bool = False
-    weak: bool = False
-
-
-_NUMBER = re.compile(r"(?<![\w.])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
+_NUMBER = re.compile(r"(?<![\w.^])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\d*x[0-9a-f])")
 # addresses, the index of a parameter, and what a rated value stands for
 _NO_VALUE = re.compile(r"\b0x[0-9a-f]+(:[0-9a-f]+)?|(?<=\w)\[\d+\]|[(\[]\s*100\s*%\s*[)\]]")
 _BRACKET = re.compile(r"[\[({]([^\[({]*?)[\])}][\s:=;,|\"']*$")
@@ -64,16 +50,6 @@ _DEVIATES = re.compile(
     r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
     r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"
 )
-# behind a number, what it is: 8192 per motor turn, 250 samples per second, 5 ms per line
-_PER_TURN = re.compile(
-    r"^ *(?:(?:steps|pulses|increments|inkremente|counts|impulse) )?(?:per|pro) (motor )?(?:turn|rev\w*|umdrehung)"
-    r"(?! of| der| des|/)"
-)
-_OF_COUNTS = re.compile(r"encoder|resolver|increment|inkrement|geber|codeur")
-_NO_COUNTS = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho|quadratur\w*|x ?4)\b")
-_PER_SECOND = re.compile(r"^ *(?:samples|rows) per s(?:ec|\b)")
-_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row)\b")
-_OF_FILE = re.compile(r"\b(file|rows?|record\w*|header|separated|comma|tabs?)\b|\.\w{2,5}\b")
 _THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+")  # or a decimal comma
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
@@ -86,10 +62,13 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     given = [one for line in _without_products(list(lines)) for one in _statements(line)]
     for name, scalar in scalars.items():
         words, unit = _unit_of_name(name)
-        given.append(_Statement(words, scalar, (unit,), f"{name} = {scalar:g}", words))
+        given.append(Statement(words, scalar, (unit,), f"{name} = {scalar:g}", words))
     # what is said of the motor goes before what words say, and that before what a unit alone says
     found: dict[Constant, dict[tuple[bool, bool], list[HeaderValue]]] = {}
     for one in given:
+        if mass := mass_told(one.words, one.number, one.units):
+            found.setdefault(mass[0], {}).setdefault((False, True), []).append(HeaderValue(mass[1], one.text))
+            continue
         units = one.units if any(one.units) else (*one.units, None)
         if told := next((known for unit in units if (known := _constant(one, unit))), None):
             by_words, constant, value = told
@@ -99,16 +78,16 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     return {constant: values[0] for constant, values in best.items() if len({one.value for one in values}) == 1}
 
 
-def _statements(line: str) -> Iterator[_Statement]:
+def _statements(line: str) -> Iterator[Statement]:
     """Statements of a line; numbers that follow the first one without words are those of other channels."""
     folded = _NO_VALUE.sub(" ", _folded(line.strip().strip('"#%/ ')))
     if turn := _TURN_IS.match(folded):
         size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
-        yield from [_Statement("", size, (unit,), line.strip())] if size is not None else []
+        yield from [Statement("", size, (unit,), line.strip())] if size is not None else []
         return
     if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole[1])) is not None:
-        unit = _SIGNS.sub("", whole[2])
-        yield from (_Statement(words, size, (unit,), header_text(line)) for words in ("rated torque", "rated force"))
+        units = tuple(_units_behind(whole[2]))
+        yield from (Statement(words, size, units, header_text(line)) for words in ("rated torque", "rated force"))
         return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
@@ -118,14 +97,14 @@ def _statements(line: str) -> Iterator[_Statement]:
         if value is None or _is_list(folded, matches[index:], value):
             continue
         if not _THOUSANDS.fullmatch(match[0]):
-            yield from _told_behind(before, value, behind, header_text(line))
+            yield from told_behind(before, value, behind, header_text(line))
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
             yield lead
         if re.search(r"[^\W\d]", before):
             yield _words_before(before, value, behind, header_text(line))
 
 
-def _words_before(before: str, value: float, behind: str, line: str) -> _Statement:
+def _words_before(before: str, value: float, behind: str, line: str) -> Statement:
     """The statement of a number that stands behind its words."""
     bracket = _BRACKET.search(before)
     name, unit = _unit_of_name(before)
@@ -135,32 +114,21 @@ def _words_before(before: str, value: float, behind: str, line: str) -> _Stateme
     words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
     if unit and not any(units_behind) and not bracket:
         words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
-    return _Statement(words, value, (*units, *units_behind), line, phrase)
+    return Statement(words, value, (*units, *units_behind), line, phrase)
 
 
-def _told_behind(before: str, value: float, text: str, line: str) -> Iterator[_Statement]:
-    """The statement of a number behind which its words stand, of counts per turn, a rate or a period."""
-    turn = _PER_TURN.match(text)
-    if turn and _OF_COUNTS.search(before) and not _NO_COUNTS.search(before + text):
-        yield _Statement("", value, ("counts/rev",), line, of_motor=bool(turn[1]))
-    if _PER_SECOND.match(text) and _OF_FILE.search(before):
-        yield _Statement("sample rate", value, ("hz",), line, weak=True)
-    if period := _PER_ROW.match(text):
-        yield _Statement("sample time", value, (period[1],), line, weak=True)
-
-
-def _lead_behind(before: str, value: float, text: str, line: str) -> _Statement | None:
+def _lead_behind(before: str, value: float, text: str, line: str) -> Statement | None:
     """The statement of a lead whose words follow its unit, or which a turn of the motor is; None without one."""
     if _DEVIATES.search(f"{before} {text}"):
         return None
     turn = _PER_MOTOR_TURN.match(text) or (_MOTOR_TURN_IS.search(before) and re.match(r" *([a-z]+)\b", text))
     if turn:
-        return _Statement("lead", value, (turn[1],), line, of_motor=True)
+        return Statement("lead", value, (turn[1],), line, of_motor=True)
     told = _BEHIND.match(text)
     name = re.sub(rf" ({'|'.join(lexicon().joints)})$", "", _plain(before))
     words = f"{name} {told[2]}" if told else ""
     is_lead = re.search(_pattern(lexicon().constants[Constant.LEAD]), words)
-    return _Statement(words, value, (told[1],), line) if told and is_lead else None
+    return Statement(words, value, (told[1],), line) if told and is_lead else None
 
 
 def _is_list(text: str, matches: list[re.Match[str]], value: float) -> bool:
@@ -187,7 +155,7 @@ def _units_behind(text: str) -> Iterator[str]:
         yield ""
 
 
-def _constant(told: _Statement, unit: str | None) -> tuple[bool, Constant, float] | None:
+def _constant(told: Statement, unit: str | None) -> tuple[bool, Constant, float] | None:
     """Constant that words and unit tell, True if the words do, and its value in SI; `unit` is None where none is given.
 
     Without a unit only words that stand for nothing else are taken, not those of a lead, which may be in mm or m.

@@ -65,6 +65,12 @@ class Constant(StrEnum):
     RATED_TORQUE = "rated_torque"  # [N m]
     RATED_FORCE = "rated_force"  # [N]
     RATED_CURRENT = "rated_current"  # [A]
+    LOAD_MASS = "load_mass_kg"  # of a load that slides
+    LOAD_INERTIA = "load_inertia_kg_m2"  # of a load that turns, at the load
+    MOTOR_INERTIA = "motor_inertia_kg_m2"  # of the motor and what turns with it, without its load
+
+
+NOMINAL = (Constant.LOAD_MASS, Constant.LOAD_INERTIA, Constant.MOTOR_INERTIA)  # told in sentences, see `nominal_values`
 
 
 def _lines(given: object) -> list[str]:
@@ -102,6 +108,16 @@ class ConstantWords(_Entry):
     words: Annotated[str, BeforeValidator(_pattern)]
     units: dict[str, PositiveFloat]
     alone: Annotated[str, BeforeValidator(_pattern)] = "(?!)"
+
+
+class MassWords(_Entry):
+    """Words of what a mass or an inertia is of, and of one that is not of the load, or not of the motor, alone."""
+
+    load: Words
+    motor: Words
+    neither: Words
+    mass_units: dict[str, PositiveFloat]
+    inertia_units: dict[str, PositiveFloat]
 
 
 class ScalarNames(_Entry):
@@ -152,6 +168,7 @@ class Lexicon(_Entry):
     constants: dict[Constant, ConstantWords]
     other_constants: Words
     joints: Words
+    masses: MassWords
     scalars: ScalarNames
     series: SeriesWords
     enumerated: Words
@@ -164,7 +181,7 @@ class Lexicon(_Entry):
     def _is_complete(self) -> Self:
         for field, given, allowed in (
             ("quantities", self.quantities, set(Quantity) - {Quantity.UNKNOWN}),
-            ("constants", self.constants, set(Constant)),
+            ("constants", self.constants, set(Constant) - set(NOMINAL)),
         ):
             if set(given) != allowed:
                 raise FieldError((field,), f"given {', '.join(given)}, needed {', '.join(sorted(allowed))}; correct it")

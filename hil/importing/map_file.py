@@ -176,6 +176,18 @@ class ChannelSource(_Strict):
         return None if factor is None else self.sign * self.scale * constant * factor
 
 
+class NominalMasses(_Strict):
+    """What the owner tells of the parts of an axis; a recording tells their sum alone."""
+
+    load_mass_kg: PositiveFloat | None = Field(default=None, description="of a load that slides [kg]")
+    load_inertia_kg_m2: PositiveFloat | None = Field(
+        default=None, description="of a load that turns, about its own shaft [kg m^2]"
+    )
+    motor_inertia_kg_m2: PositiveFloat | None = Field(
+        default=None, description="of the motor and what turns with it, without the load [kg m^2]"
+    )
+
+
 class RecordingMap(_Strict):
     """A map: the clock (a time column or a sample rate) and the source of each channel."""
 
@@ -194,6 +206,9 @@ class RecordingMap(_Strict):
     )
     csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
     lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")
+    nominal: NominalMasses = Field(
+        default=NominalMasses(), description="masses of the parts of the axis, which split the one that is found"
+    )
     channels: dict[str, ChannelSource] = Field(description="channel name -> where it comes from")
 
     @property

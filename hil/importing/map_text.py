@@ -4,6 +4,7 @@ import json
 import re
 
 from hil.channels import CHANNELS
+from hil.importing.lexicon import NOMINAL
 from hil.importing.map_draft import MapDraft
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -52,6 +53,9 @@ def map_text(draft: MapDraft) -> str:
         lines += [f"lead_m:   {ASKED} {asked['', 'lead_m']}"]
     elif draft.lead_m is not None:
         lines += [f"lead_m: {draft.lead_m!r}   # m per revolution of the motor; {draft.lead_how}"]
+    told = [(one, draft.table.constants[one]) for one in NOMINAL if one in draft.table.constants]
+    lines += ["nominal:                  # masses of the parts, which split the one that is found"] if told else []
+    lines += [f"  {one}: {_value(value.value)}   # {value.text}" for one, value in told]
     lines += [*_KEYS.rstrip().splitlines(), "channels:"]
     for one in draft.channels:
         lines += [f"  {one.channel}:   # {CHANNELS[one.channel].meaning} [{CHANNELS[one.channel].unit}]; {one.how}"]

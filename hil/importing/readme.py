@@ -14,6 +14,7 @@ from hil.importing.unit_lines import described
 from hil.importing.units import unit_named
 
 _WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
+_BEHIND_NAME = r"(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|\t\s*)"
 _LONGEST = 1_000_000  # bytes: no README is as long
 
 
@@ -60,16 +61,31 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
 
 def _listed(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Words and unit of columns in a list of them, a line each: "q_mot   motor encoder, degrees of the motor"."""
-    told = {}
+    told = dict[str, tuple[str, str]]()
     for name in names:
-        begin = re.compile(rf"[\s*•-]*{re.escape(name)}(?:\s*:\s*|\s+[-–]\s+|\s{{2,}}|\t\s*)(?=\S)(.*)")
-        for rest in (match[1] for line in lines if name and (match := begin.match(line))):
-            phrases = [part.strip() for part in re.split(r"[,;()]", rest) if part.strip()]
-            unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
-            if unit:
-                told[name] = ("" if phrases[0] == unit else phrases[0], unit)
-                break
+        number = re.fullmatch(r"column (\d+)", name)  # of a file without a header
+        begin = rf"(?:column )?{number[1]}(?:[.):]\s*|\s+)" if number else rf"{re.escape(name)}{_BEHIND_NAME}"
+        found = (re.match(rf"[\s*•-]*{begin}(?=\S)(.*)", line, re.IGNORECASE) for line in lines if name)
+        one = next((one for match in found if match and (one := _words_and_unit(match[1]))), None)
+        told |= {name: one} if one else {}
+    return told if len(told) > 1 else _in_a_row(" ".join(lines), names)
+
+
+def _in_a_row(text: str, names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """The same of columns that a sentence lists: "angle = table angle in degrees (0.001 deg), iq = current in A"."""
+    places = [(match, name) for name in names if (match := re.search(rf"(?<!\w){re.escape(name)} = ", text))]
+    places.sort(key=lambda place: place[0].start())
+    ends = [*(match.start() for match, _ in places), len(text)][1:]
+    parts = {name: text[match.end() : end] for (match, name), end in zip(places, ends, strict=True)}
+    told = {name: one for name, part in parts.items() if (one := _words_and_unit(re.split(r"[.](?:\s|$)", part)[0]))}
     return told if len(told) > 1 else {}
+
+
+def _words_and_unit(text: str) -> tuple[str, str] | None:
+    """Words and unit of what a list says of a column; None without a unit."""
+    phrases = [part.strip() for part in re.split(r"[,;()]", text) if part.strip()]
+    unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
+    return ("" if phrases[0] == unit else phrases[0], unit) if unit else None
 
 
 def _unit_at_an_end(phrase: str) -> str:

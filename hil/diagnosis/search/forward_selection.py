@@ -113,7 +113,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     tried, fitted, exchanged_from = [effects(())], set[str](), list[_Explanation]()
     while len(base.terms) < MOST_TERMS:
         begins = not base.terms or bool(base.data.set_aside)  # what was found above the noise, rows at rest may tell
-        if begins and base.within_noise and not base.data.apart and (plain := fit_plain(base.data)):
+        apart = _noisy_springs(base.data) or (begins and base.within_noise and not base.data.apart)
+        if apart and (plain := fit_plain(base.data)):
             begin = base if base.terms else less_torque(plain, given, base)
             quiet = noise_apart(base.data, begin.hypothesis, plain)
             base, given = over(quiet, begin), carried(quiet, given)
@@ -194,6 +195,11 @@ def unexplained_channels(fit: Fit) -> dict[str, float]:
     left = {name: value for name, value in rms.items() if value**2 > floor}
     inputs = {name for name, value in rms.items() if value < _INPUT}
     return left if set(rms) - set(left) - inputs - fit.data.observability.hidden else {}
+
+
+def _noisy_springs(data: Dataset) -> bool:
+    """True for springs driven by a torque with noise: a light motor answers it far above the noise of its encoder."""
+    return bool(data.bench.axis.SPRINGS) and data.observability.noisy_torque_input
 
 
 def less_torque(plain: PlainModel, *fits: Fit) -> Fit:

@@ -59,9 +59,14 @@ def behind_plain(judged: Judged) -> bool:
 
 
 def with_less_torque(given: Judged, other: Judged) -> Judged:
-    """The verdict whose twin misses less torque of the held-out motion; the first where both miss as much."""
+    """The verdict whose twin misses less torque of the held-out motion; the first where both miss as much.
+
+    Another that leaves the second encoder above its noise, and farther than the first does, is none.
+    """
     left, less = (torque_missed(one.final, one.tested.searched.prepared.held_out) for one in (given, other))
-    return other if left is not None and less is not None and less < left else given
+    before, after = (max(run.get(_TABLE, 0.0) for run in one.final.noise_ratios) for one in (given, other))
+    worse = after > max(CRITERIA.floor, CRITERIA.worse * before)
+    return other if left is not None and less is not None and less < left and not worse else given
 
 
 def _missed_by_plain(fit: Fit, held_out: Dataset) -> float | None:

@@ -125,3 +125,23 @@ def test_a_part_of_a_unit_is_none(words: str, unit: str) -> None:
     told = _listed([f" a   {words}", " b - time s", " c   see below", " c   force, N"], ["a", "b", "c"])
     assert told.get("a", ("", ""))[1] == unit
     assert (told["b"][1], told["c"][1]) == ("s", "N")
+
+
+def test_columns_without_a_header_are_listed_by_their_numbers() -> None:
+    lines = [
+        "Four columns:",
+        " 1 time in s",
+        " 2. encoder counts, 16384 counts per turn",
+        " 4 motor current in A (kt = 0.07)",
+    ]
+    told = _listed(lines, [f"column {number}" for number in range(1, 5)])
+    assert {name: unit for name, (_, unit) in told.items()} == {"column 1": "s", "column 2": "counts", "column 4": "A"}
+
+
+def test_columns_are_listed_in_a_sentence() -> None:
+    lines = [
+        "Columns: n = sample number, angle = table angle in degrees (ring encoder, 0.0001 deg),",
+        "iq = current in A rms.",
+    ]
+    told = _listed(lines, ["n", "angle", "iq"])
+    assert {name: unit for name, (_, unit) in told.items()} == {"angle": "degrees", "iq": "A rms"}

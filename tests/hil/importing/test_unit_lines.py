@@ -194,3 +194,10 @@ def test_a_list_of_channels_with_a_field_less_than_the_rows_gives_their_units(tm
         "position_command_m": "mm",
         "torque_n_m": "N m",
     }
+
+
+def test_a_blank_may_follow_a_name_with_a_digit() -> None:
+    lines = ["; CH1 Motor position [inc]", "; CH2 Output encoder [deg]", "; CH3 Iq actual [A rms]"]
+    told = described(lines, ["CH1", "CH2", "CH3"])
+    assert told == {"CH1": ("Motor position", "inc"), "CH2": ("Output encoder", "deg"), "CH3": ("Iq actual", "A rms")}
+    assert described(["motor position [mm]", "table position [mm]"], ["motor", "table"]) == {}

@@ -1,0 +1,67 @@
+"""Parts of the mass of a two-mass axis: of the motor, of the load.
+
+Below the resonance of the transmission recordings tell the sum, and load over stiffness, but not the parts. What the
+owner says of them does, a few per cent off. Of two that are told the ratio counts: the recordings tell the sum.
+"""
+
+from dataclasses import replace
+from math import pi
+from typing import NamedTuple
+
+from hil.identification.least_squares import Estimate
+from hil.importing.by_map import NOMINAL_MASSES
+from hil.importing.lexicon import Constant
+from hil.quantities import quantity
+from hil.recording.recording import Recording
+
+_OWNER = 0.1  # of the smaller part: data sheets and weighed parts are a few per cent off
+_LEAST = 1e-3  # share of a part: less is an error of a unit, or of the sum
+
+
+class Split(NamedTuple):
+    """Parts of a total, motor first; `how` they were found, `told`: by the owner."""
+
+    motor: Estimate
+    load: Estimate
+    how: str
+    told: bool
+
+    def with_load(self, factor: float) -> "Split":
+        """The same total with the load times a factor."""
+        load = self.load.scaled(factor)
+        motor = replace(self.motor, value=self.motor.value + self.load.value - load.value)
+        return self._replace(motor=motor, load=load)
+
+
+def nominal_sum(recording: Recording, lead_m: float, turns: bool) -> Estimate | None:
+    """Inertia of the whole axis at the motor [kg m^2] as the owner tells it; None without one of the parts."""
+    motor, load = _parts(recording, lead_m, turns)
+    return Estimate(motor + load, _OWNER * (motor + load), "as the owner tells") if motor and load else None
+
+
+def _parts(recording: Recording, lead_m: float, turns: bool) -> tuple[float, float]:
+    """Inertia of motor and load at the motor [kg m^2] as the owner tells them; 0: not told."""
+    told, factor = recording.metadata.get(NOMINAL_MASSES, {}), (lead_m / (2.0 * pi)) ** 2
+    load = told.get(Constant.LOAD_INERTIA if turns else Constant.LOAD_MASS, 0.0)
+    return told.get(Constant.MOTOR_INERTIA, 0.0), factor * load
+
+
+def split_of(total: Estimate, recording: Recording, lead_m: float, turns: bool) -> Split:
+    """Parts of a total inertia, in units of the motor [kg m^2]: by the owner's words, else half and half."""
+    motor, load = _parts(recording, lead_m, turns)
+    share = load / (load + motor) if load and motor else load / total.value if load else 1.0 - motor / total.value
+    if not (load or motor) or not _LEAST < share < 1.0 - _LEAST:
+        half = replace(total.scaled(0.5), std_error=0.5 * total.value)  # as large as the half itself
+        return Split(half, half, "half of the sum: the split is not told", False)
+    error = _OWNER * min(share, 1.0 - share) * total.value
+    motor_part, load_part = (replace(total, value=one * total.value, std_error=error) for one in (1.0 - share, share))
+    told = recording.metadata[NOMINAL_MASSES]
+    words = [f"{quantity(told[key], unit)} {of}" for key, of, unit in _WORDS if key in told]
+    return Split(motor_part, load_part, f"split of the sum as the owner tells: {', '.join(words)}", True)
+
+
+_WORDS = (
+    (Constant.LOAD_MASS, "of the load", "kg"),
+    (Constant.LOAD_INERTIA, "of the load", "kg m^2"),
+    (Constant.MOTOR_INERTIA, "of the motor", "kg m^2"),
+)

@@ -7,7 +7,7 @@ from hil.drafting.bench_value import BenchValue, estimated
 from hil.drafting.plant_values import PlantValues, TransmissionValues
 from hil.drafting.ratio_values import gear_of
 from hil.drafting.split import Split, split_of
-from hil.identification.least_squares import Estimate
+from hil.identification.least_squares import SIGMAS, Estimate
 from hil.quantities import ROTARY_LEAD_M, digits, unit_of
 from hil.recording.recording import Recording
 
@@ -20,7 +20,8 @@ _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 class AxisDraft:
     """A drafted section: its kind, its keys with values, what the owner of the axis should check, and keys held.
 
-    `share_of_load` is the share of Coulomb friction that acts on the load of an axis with a spring; None: not told.
+    `share_of_load` and `viscous_share` are those of Coulomb and viscous friction that act on the load of an axis with a
+    spring; None: not told.
     """
 
     model: str
@@ -28,6 +29,7 @@ class AxisDraft:
     unsure: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     share_of_load: Estimate | None = None
+    viscous_share: Estimate | None = None
 
 
 def draft_axis(
@@ -51,23 +53,35 @@ def draft_axis(
         return _screw(plant, deflection, lead, split)
 
     split = split_of(plant.inertia, recording, lead.value, turns)
-    axis = drafted(split)
-    share = _share_of_load(axis, plant, transmission, lead)
+    axis = _with_friction_of_load(drafted(split), plant, transmission, lead)
+    share = axis.share_of_load
     if share is not None and share.value > 1.0 and not split.told:  # a spring as stiff as that has a lighter load
-        axis = drafted(split.with_load(0.5 / share.value))
-        share = _share_of_load(axis, plant, transmission, lead)
+        axis = _with_friction_of_load(drafted(split.with_load(0.5 / share.value)), plant, transmission, lead)
+        share = axis.share_of_load
     return replace(axis, share_of_load=None if share is None else replace(share, value=min(share.value, 1.0)))
 
 
-def _share_of_load(
+def _with_friction_of_load(
     axis: AxisDraft, plant: PlantValues, transmission: TransmissionValues | None, lead: Estimate
-) -> Estimate | None:
-    """Share of Coulomb friction on the load, by what the second encoder lags behind the motor's in each direction."""
-    stiffness = next((one.value for one in axis.values if one.key in _STIFFNESS), None)
-    if stiffness is None or transmission is None or not plant.coulomb.significant:
-        return None
-    lag = transmission.friction_m.scaled(-float(stiffness) * lead.value / (2.0 * pi) / plant.coulomb.value)
-    return replace(lag, how="friction over stiffness, or lost motion") if lag.significant and lag.value > 0.0 else None
+) -> AxisDraft:
+    """The draft with the shares of the friction that acts on the load.
+
+    By what the second encoder lags behind the motor's in each direction, and by the velocity. It is late itself where
+    the viscous friction would have to be more than there is.
+    """
+    stiffness = next((float(one.value) for one in axis.values if one.key in _STIFFNESS), 0.0)
+    if not stiffness or transmission is None or not plant.coulomb.significant:
+        return axis
+    at_motor = stiffness * lead.value / (2.0 * pi)
+    share = transmission.friction_m.scaled(-at_motor / plant.coulomb.value)
+    if not (share.significant and share.value > 0.0):
+        return axis
+    axis = replace(axis, share_of_load=replace(share, how="friction over stiffness, or lost motion"))
+    if not plant.viscous.significant:
+        return axis
+    late = transmission.delay_s.scaled(at_motor * transmission.ratio.value / plant.viscous.value)
+    viscous = replace(late, value=min(max(late.value, 0.0), 1.0), how="friction over stiffness, or an encoder late")
+    return replace(axis, viscous_share=viscous) if abs(late.value - viscous.value) <= SIGMAS * late.std_error else axis
 
 
 def _deflection_s2(transmission: TransmissionValues) -> Estimate | None:

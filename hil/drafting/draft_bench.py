@@ -19,7 +19,7 @@ from hil.identification.least_squares import Estimate
 from hil.importing.by_map import STEP
 from hil.recording.quantum import count_of, is_decimal
 from hil.recording.recording import Recording
-from hil.twin.mechanisms import constant_load, gravity_torque, table_side_friction
+from hil.twin.mechanisms import constant_load, gravity_torque, table_side_friction, table_side_viscous_friction
 
 _FINEST_M, _COARSEST_M = 1e-12, 1e-3  # resolution of a second encoder that a bench file takes
 _MOST_COUNTS = 2**31  # per revolution: noise below a count of this encoder is that of numbers
@@ -132,16 +132,28 @@ def _loads(draft: BenchDraft, plant: PlantValues) -> None:
         (name,) = (parameter.name for parameter in constant_load.MECHANISM.parameters)
         held = "a load, friction that differs by direction, or a zero of the drive"
         draft.mechanisms[constant_load.MECHANISM.id] = [estimated(name, plant.offset, "at the motor", held)]
-    if draft.axis.share_of_load is not None:
-        (name,) = (parameter.name for parameter in table_side_friction.MECHANISM.parameters)
-        share = estimated(name, draft.axis.share_of_load, "of the friction")
-        draft.mechanisms[table_side_friction.MECHANISM.id] = [share]
+    _friction_of_load(draft)
     if plant.gravity is not None and plant.gravity_angle is not None and plant.gravity.significant:
         torque, angle = (parameter.name for parameter in gravity_torque.MECHANISM.parameters)
         draft.mechanisms[gravity_torque.MECHANISM.id] = [
             estimated(torque, plant.gravity, "N m at the load"),
             estimated(angle, plant.gravity_angle, "rad: the angle of the load is seen from straight down"),
         ]
+
+
+def _friction_of_load(draft: BenchDraft) -> None:
+    """Shares of the friction on the load: that of viscous friction counts from that of Coulomb friction on."""
+    share, viscous = draft.axis.share_of_load, draft.axis.viscous_share
+    if share is None:
+        return
+    for mechanism, one in ((table_side_friction, share), (table_side_viscous_friction, viscous)):
+        if one is None:
+            continue
+        beyond = one.value - share.value
+        rest = 1.0 - share.value if beyond > 0.0 else share.value
+        more = one if one is share else replace(one, value=beyond / rest if rest else 0.0)
+        (name,) = (parameter.name for parameter in mechanism.MECHANISM.parameters)
+        draft.mechanisms[mechanism.MECHANISM.id] = [estimated(name, more, "of the friction")]
 
 
 def _encoders(draft: BenchDraft, recording: Recording) -> None:

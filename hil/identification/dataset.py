@@ -28,8 +28,7 @@ FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = LEAST_TICKS, 0.
 
 class NoiseApart(NamedTuple):
     """A run without the noise of its motion, the rows (n,) that it tells, and what `hil.identification.noise_apart`
-    makes of its residuals (n,) by channel. `followed`: the run by which the second encoder of an axis with springs is
-    judged, in all its rows; None without one.
+    makes of its residuals (n,) by channel.
 
     `noise` and `measured` (n,) are of a reference with an inertia [motor unit]: what the noise makes, and all that was
     measured. What a twin makes of the motor without noise passes the mean over `window` rows, as the noise did (0:
@@ -37,7 +36,6 @@ class NoiseApart(NamedTuple):
     """
 
     smooth: Measured
-    followed: Measured | None
     rows: NDArray[np.bool_]
     noise: dict[str, FloatArray]
     measured: dict[str, FloatArray]

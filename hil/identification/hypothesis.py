@@ -26,7 +26,8 @@ from hil.identification.coordinates import (
     known_values,
     with_values,
 )
-from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset, NoiseApart
+from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
+from hil.identification.followed import behind_motor
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
 from hil.identification.residuals import Residuals, differences
@@ -45,7 +46,7 @@ SEARCH_STEPS_S = (100e-6, 500e-6)
 
 
 class Resolved(NamedTuple):
-    """Bench with the nominal parameters of a hypothesis, and its terms with their values."""
+    """Bench and terms with the values of a hypothesis."""
 
     bench: Bench
     terms: tuple[Term, ...]
@@ -106,9 +107,7 @@ class Hypothesis:
 
     @property
     def given(self) -> "Hypothesis":
-        """The hypothesis with the nominal parameters as the bench file gives them; a delay of the torque that it leaves
-        open keeps its fitted value.
-        """
+        """The hypothesis with the nominal parameters of the bench file, but for a delay that it leaves open."""
         told = [name != DELAY or bool(self.bench.torque_delay_s) for name in self.nominal]
         from_file = np.array(told + [False] * (self.x.size - self.nominal_count))
         return self.moved(np.where(from_file, self._initial, self.x))
@@ -253,10 +252,13 @@ class Hypothesis:
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
     ) -> dict[str, FloatArray]:
-        """Measured less twin with each block fed measured inputs, per channel (n,); 0 for hidden channels.
+        """Measured less twin, blocks fed measured inputs, per channel (n,); 0: hidden. The motor rests as in `rests`."""
+        return self.driven(run, observer_s, fast, rests) | behind_motor(self, run, fast, rests)
 
-        The motor rests where it does in `rests`, by default in the run.
-        """
+    def driven(
+        self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
+    ) -> dict[str, FloatArray]:
+        """The same where the measured torque drives the axis in each block."""
         twin = self.twin(observer_s, fast, run)
         measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
         predicted = twin.observe(
@@ -266,13 +268,6 @@ class Hypothesis:
         residuals["command"] = measured.torque_command - predicted.torque_command
         return residuals | {name: np.zeros(run.motor.size) for name in run.observability.hidden}
 
-    def _without_noise(self, apart: NoiseApart, run: Measured, observer_s: float, fast: bool) -> dict[str, FloatArray]:
-        free, own = self.blocks(apart.smooth, observer_s, fast, rests=run), inertia(self.resolved.bench)
-        found = {name: apart.of(name, values, own) for name, values in free.items()}
-        if apart.followed is not None:
-            found["table"] = self.blocks(apart.followed, observer_s, fast, rests=run)["table"]
-        return found
-
     def residuals(self, data: Dataset, closed: bool = False, fast: bool = False) -> Residuals:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
         key = (data, closed, fast)
@@ -281,8 +276,12 @@ class Hypothesis:
             if closed:
                 channels = [differences(run.response, self.respond(run), bench, run.evaluated) for run in runs]
             elif data.apart:
-                pairs = zip(data.apart, runs, strict=True)
-                channels = [self._without_noise(one, run, data.observer_s, fast) for one, run in pairs]
+                own = inertia(self.resolved.bench)
+                channels = [
+                    {name: one.of(name, values, own) for name, values in free.items()} | behind_motor(self, run, fast)
+                    for one, run in zip(data.apart, runs, strict=True)
+                    for free in [self.driven(one.smooth, data.observer_s, fast, rests=run)]
+                ]
             else:
                 channels = [self.blocks(run, data.observer_s, fast) for run in runs]
             self._done[key] = Residuals(data, tuple(channels))

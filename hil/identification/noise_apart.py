@@ -2,7 +2,7 @@
 
     r(theta) = g w * [K e(theta; smooth) J(theta) / J(theta0) + e(K left)]           without a spring
     r(theta) = g w * [e(theta; smooth) J(theta) / J(theta0) + e(theta0; left) - e(theta0; smooth)]    with springs
-    r(theta) = e(theta; measured motion, torque of smooth)                           second encoder, with springs
+    r(theta) = e(theta; measured)                                                    second encoder, with springs
     r(theta) = e(theta; smooth) + [e(theta0; measured) - e(theta0; smooth)]          other channels than the motor
     r(theta) = e(theta0; measured)                                                   other rows, that do not slide
 
@@ -13,10 +13,10 @@ prefers an axis that answers less: more inertia, a resonance, a lag (errors in v
 Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for
 every hypothesis. What is left enters as it was measured, through the mean K of the measured motion; what a hypothesis
 lacks passes the same mean. A resonance would pass less of the noise: there it goes through the
-reference alone. The second encoder follows the motor as it was measured: a mean would take off the motion that tells
-load over stiffness and damping. So a fit is least squares of the torque; w whitens it by the autoregressive model of
-what the plain model leaves, so that slow errors do not hide a faster effect, and g keeps the rms of e(theta0;
-measured). About a reversal smoothed motion tells nothing.
+reference alone. No torque is in a second encoder behind the measured motor (`hil.identification.followed`). So a fit is
+least squares of the torque; w whitens it by the autoregressive model of what the plain model leaves, so that slow
+errors do not hide a faster effect, and g keeps the rms of e(theta0; measured). About a reversal smoothed motion tells
+nothing.
 """
 
 from collections.abc import Sequence
@@ -53,20 +53,19 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     taps, gain, window = np.ones(1), 1.0, 0
     needed = np.where(rows, plain.predict(moved), run.torque) if springs else plain.predict(moved)
     smooth = _driven(replace(run, motor=moved.position), needed)
-    measured, free = (reference.blocks(one, data.observer_s, rests=run) for one in (run, smooth))
+    measured, free = (reference.driven(one, data.observer_s, rests=run) for one in (run, smooth))
     noise, of_reference = {name: measured[name] - free[name] for name in measured}, inertia(reference.resolved.bench)
     if rows.any():
         of_model, a = plain.predict(own.moved), run.period_s / data.observer_s
         taps, left = _whitened(np.where(rows, run.torque - of_model, 0.0), moved, rows, plain, a)
         if springs:
             noise["motor"] = (
-                reference.blocks(_driven(smooth, needed + left), data.observer_s, rests=run)["motor"] - free["motor"]
+                reference.driven(_driven(smooth, needed + left), data.observer_s, rests=run)["motor"] - free["motor"]
             )
         else:
             window, beyond = own.window, observed(np.where(rows, own.torque - of_model, 0.0), a)
             noise["motor"] = -beyond * data.observer_s**2 / of_reference
-    followed = _driven(run, needed) if springs and run.table_m.size else None
-    apart = NoiseApart(smooth, followed, rows, noise, measured, of_reference, taps, gain, window)
+    apart = NoiseApart(smooth, rows, noise, measured, of_reference, taps, gain, window)
     least = rms(apart.of("motor", free["motor"], of_reference)[rows]) if rows.any() else 0.0
     return apart._replace(gain=rms(measured["motor"][rows]) / least) if least else apart
 

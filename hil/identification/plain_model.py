@@ -114,7 +114,12 @@ def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judge
 
 def noiseless_motion(position: FloatArray, period_s: float) -> MeasuredMotion:
     """Motion (n,) of a position that no sensor measured: its mean is over a few rows, where it has no noise at all."""
-    return matched_motion(position, period_s, _window(position, _noise(position)[1], period_s, 0.0))
+    return matched_motion(position, period_s, shortest_window(position, period_s))
+
+
+def shortest_window(position: FloatArray, period_s: float) -> int:
+    """Rows of the shortest window in which the acceleration of a position (n,) has little noise."""
+    return _window(position, _noise(position)[1], period_s, 0.0)
 
 
 def _window(position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S) -> int:

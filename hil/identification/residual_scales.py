@@ -57,6 +57,11 @@ def factor_of_masses(bench: Bench, wanted: float) -> float:
     return 1.0 + (wanted - light) / (heavy - light) if heavy > light else 1.0
 
 
+def follows(run: Measured, springs: bool) -> bool:
+    """True where the second encoder is judged behind the measured motor: springs, driven by a torque with noise."""
+    return springs and bool(run.table_m.size) and run.observability.noisy_torque_input
+
+
 def scales(
     run: Measured, bench: Bench, observer_s: float, torque_accuracy: float, discrepancy: float
 ) -> dict[str, FloatArray]:
@@ -106,7 +111,7 @@ def block_noise(run: Measured, bench: Bench, observer_s: float) -> dict[str, Flo
     passed = lfilter(numerator, [1.0, -2.0 * a, a * a], impulse)
     table, torque = (np.full(run.motor.shape, noise) for noise in (run.noise.table_m, run.noise.torque))
     noise = {"motor": run.motor_noise * np.linalg.norm(passed), "table": table, "torque": torque, "command": torque}
-    if run.observability.noisy_torque_input:  # its noise drives the twin too
+    if run.observability.noisy_torque_input:  # its noise drives the twin too, but for what follows the motor
         for name, response in impulse_responses(run, bench, observer_s).items():
             noise[name] = np.hypot(noise[name], run.noise.torque * np.linalg.norm(response))
     return noise
@@ -195,6 +200,6 @@ def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[st
     kicked = twin.observe(still, still, measured._replace(torque_command=np.eye(1, ticks, 1)[0]), start)
     moved = kicked.motor_position - quiet.motor_position
     responses = {"motor": moved[1:]}
-    if run.table_m.size:
+    if run.table_m.size and not follows(run, bool(bench.axis.SPRINGS)):
         responses["table"] = (kicked.table_position_m - quiet.table_position_m - ratio * moved)[1:]
     return responses

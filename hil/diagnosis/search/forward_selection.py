@@ -7,7 +7,7 @@ that are no longer needed are removed: a first term may have imitated two causes
 import math
 import time
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -21,20 +21,19 @@ from hil.diagnosis.search.exchange import exchanged
 from hil.diagnosis.search.facts import axis_facts
 from hil.diagnosis.search.initial_values import claimable
 from hil.diagnosis.search.next_term import Additions, SearchRound, first_standing, next_term
+from hil.diagnosis.search.refits import carried, less_torque, noisy_springs, over
 from hil.diagnosis.search.restart import again
 from hil.diagnosis.search.rivals import ENDED, RivalFit, chosen, ended
 from hil.diagnosis.search.score_test import screen_library
 from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.stages import Prepared, Progress, Searched
-from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain, bic_margin, standard_errors, whitening
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
-from hil.identification.plain_model import PlainModel
 from hil.identification.terms import Key, Term, compatible, effects, free_slot
-from hil.identification.torque_left import fit_plain, left_by_twin, mismatch_left
+from hil.identification.torque_left import fit_plain, mismatch_left
 from hil.twin.library import BY_ID, LIBRARY
 from hil.twin.physics import Active
 
@@ -113,7 +112,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     tried, fitted, exchanged_from = [effects(())], set[str](), list[_Explanation]()
     while len(base.terms) < MOST_TERMS:
         begins = not base.terms or bool(base.data.set_aside)  # what was found above the noise, rows at rest may tell
-        apart = _noisy_springs(base.data) or (begins and base.within_noise and not base.data.apart)
+        apart = noisy_springs(base.data) or (begins and base.within_noise and not base.data.apart)
         if apart and (plain := fit_plain(base.data)):
             begin = base if base.terms else less_torque(plain, given, base)
             quiet = noise_apart(base.data, begin.hypothesis, plain)
@@ -195,31 +194,6 @@ def unexplained_channels(fit: Fit) -> dict[str, float]:
     left = {name: value for name, value in rms.items() if value**2 > floor}
     inputs = {name for name, value in rms.items() if value < _INPUT}
     return left if set(rms) - set(left) - inputs - fit.data.observability.hidden else {}
-
-
-def _noisy_springs(data: Dataset) -> bool:
-    """True for springs driven by a torque with noise: a light motor answers it far above the noise of its encoder."""
-    return bool(data.bench.axis.SPRINGS) and data.observability.noisy_torque_input
-
-
-def less_torque(plain: PlainModel, *fits: Fit) -> Fit:
-    """The fit that leaves least of the torque: the noise of its torque may have led a fit astray."""
-
-    def left(fit: Fit) -> float:
-        share = left_by_twin(fit.hypothesis, fit.data, plain)
-        return math.inf if share is None else share
-
-    return min(fits, key=left)
-
-
-def over(data: Dataset, fit: Fit) -> Fit:
-    """Fit the hypothesis of a fit to another data set."""
-    return replace(fit.estimator, data=data).fit(fit.hypothesis, evaluations=ENDED)
-
-
-def carried(data: Dataset, fit: Fit) -> Fit:
-    """A fit with its own values on another data set, with the residuals and the Jacobian there."""
-    return replace(replace(fit.estimator, data=data).fit(fit.hypothesis, evaluations=1), converged=fit.converged)
 
 
 def _without(fit: Fit, index: int) -> Fit:

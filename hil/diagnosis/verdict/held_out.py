@@ -4,7 +4,8 @@ from dataclasses import replace
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.events_everywhere import with_events
-from hil.diagnosis.search.forward_selection import carried, claimed, over
+from hil.diagnosis.search.forward_selection import claimed
+from hil.diagnosis.search.refits import carried, over
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.structure_left import like_noise, structure_left
 from hil.diagnosis.verdict.cross_validation import CrossValidation, Rivals, cross_validate

@@ -1,0 +1,72 @@
+"""Second encoder of an axis with springs behind the measured motor, whatever torque moved it.
+
+    m_t x'' = k (r q - x) + c (r q' - x') - F_t(x')        x second encoder, q measured motor: no torque
+
+A torque that is measured with noise would drive the twin's motor, and the lighter the motor the farther: the noise of
+the torque would then be in what the second encoder reads of the twin. Here the motor follows its measured motion: it is
+so heavy that neither spring nor friction moves it, and gets the torque of its measured acceleration. The observer
+corrects what is faster than that acceleration's mean, at its fastest.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hil.arrays import FloatArray
+from hil.identification.derivatives import matched_motion
+from hil.identification.measured import Measured
+from hil.identification.plain_model import shortest_window
+from hil.identification.residual_scales import follows
+from hil.identification.residuals import differences
+from hil.identification.standstill import resting
+from hil.twin.stepping.loops import LEAST_TICKS
+from hil.twin.structure.chain import Chain
+from hil.twin.structure.modal import modal
+
+if TYPE_CHECKING:
+    from hil.identification.hypothesis import Hypothesis
+
+_HEAVIER = 1e3  # motor over the axis: the spring moves it by a thousandth, which the observer takes back
+_MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
+
+
+def behind_motor(
+    hypothesis: "Hypothesis", run: Measured, fast: bool = False, rests: Measured | None = None
+) -> dict[str, FloatArray]:
+    """Residual (n,) of a second encoder that is judged behind the measured motor; empty without one.
+
+    `fast`: with the internal steps of a search. The motor rests where it does in `rests`, by default in the run.
+    """
+    if not follows(run, bool(hypothesis.bench.axis.SPRINGS)):
+        return {}
+    twin = hypothesis.twin(LEAST_TICKS * run.period_s, fast, run)
+    measured, rest = hypothesis.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
+    chain = _with_heavy_motor(twin.physics.chain)
+    acceleration = matched_motion(measured.motor_position, run.period_s, _window(run)).acceleration
+    torque = float(chain.inertia_kg_m2.sum()) * acceleration
+    heavy = replace(twin, physics=replace(twin.physics, chain=chain))
+    inputs = measured._replace(torque_command=torque, torque=torque)
+    predicted = heavy.observe(
+        run.position_command_m, run.velocity_command_m_s, inputs, run.start, rest, run.feedforward
+    )
+    return {"table": differences(measured, predicted, hypothesis.bench, run.evaluated)["table"]}
+
+
+@lru_cache(maxsize=32)
+def _window(run: Measured) -> int:
+    return shortest_window(run.motor, run.period_s)
+
+
+def _with_heavy_motor(chain: Chain) -> Chain:
+    """The chain with a heavy motor and the same springs and dampers."""
+    own = modal(chain)
+    damping = own.shape @ np.diag(2.0 * own.damping_ratio * own.frequency_rad_s) @ own.shape.T
+    damping = chain.inertia_kg_m2 @ damping @ chain.inertia_kg_m2
+    inertia = chain.inertia_kg_m2.copy()
+    inertia[chain.motor, chain.motor] += _HEAVIER * float(chain.inertia_kg_m2.sum())
+    heavy = modal(replace(chain, inertia_kg_m2=inertia))
+    per_mode = np.einsum("im,ij,jm->m", heavy.shape, damping, heavy.shape)
+    ratio = np.where(heavy.frequency_rad_s > 0.0, 0.5 * per_mode / np.maximum(heavy.frequency_rad_s, 1e-300), 0.0)
+    return replace(chain, inertia_kg_m2=inertia, damping_ratio=np.clip(ratio, 0.0, _MOST_DAMPED))

@@ -5,7 +5,8 @@
 A torque that is measured with noise would drive the twin's motor, and the lighter the motor the farther: the noise of
 the torque would then be in what the second encoder reads of the twin. Here the motor follows its measured motion: it is
 so heavy that neither spring nor friction moves it, and gets the torque of its measured acceleration. The observer
-corrects what is faster than that acceleration's mean, at its fastest.
+corrects what is faster than that acceleration's mean. A coarse encoder would drive a resonance with its counts: there
+the torque tells the motion better (`hil.identification.residual_scales.follows`).
 """
 
 from dataclasses import replace
@@ -21,7 +22,6 @@ from hil.identification.plain_model import shortest_window
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
-from hil.twin.stepping.loops import LEAST_TICKS
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import modal
 
@@ -33,15 +33,15 @@ _MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
 
 
 def behind_motor(
-    hypothesis: "Hypothesis", run: Measured, fast: bool = False, rests: Measured | None = None
+    hypothesis: "Hypothesis", run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
 ) -> dict[str, FloatArray]:
     """Residual (n,) of a second encoder that is judged behind the measured motor; empty without one.
 
     `fast`: with the internal steps of a search. The motor rests where it does in `rests`, by default in the run.
     """
-    if not follows(run, bool(hypothesis.bench.axis.SPRINGS)):
+    if not follows(run, bool(hypothesis.bench.axis.SPRINGS), observer_s):
         return {}
-    twin = hypothesis.twin(LEAST_TICKS * run.period_s, fast, run)
+    twin = hypothesis.twin(observer_s, fast, run)
     measured, rest = hypothesis.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
     chain = _with_heavy_motor(twin.physics.chain)
     acceleration = matched_motion(measured.motor_position, run.period_s, _window(run)).acceleration
@@ -52,6 +52,14 @@ def behind_motor(
         run.position_command_m, run.velocity_command_m_s, inputs, run.start, rest, run.feedforward
     )
     return {"table": differences(measured, predicted, hypothesis.bench, run.evaluated)["table"]}
+
+
+def second_encoder(hypothesis: "Hypothesis", run: Measured, observer_s: float, fast: bool) -> dict[str, FloatArray]:
+    """Residual (n,) of the second encoder of an axis with springs, by the motion that was measured; else empty."""
+    if not (hypothesis.bench.axis.SPRINGS and run.table_m.size):
+        return {}
+    behind = behind_motor(hypothesis, run, observer_s, fast)
+    return behind or {"table": hypothesis.driven(run, observer_s, fast)["table"]}
 
 
 @lru_cache(maxsize=32)

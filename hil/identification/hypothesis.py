@@ -27,7 +27,7 @@ from hil.identification.coordinates import (
     with_values,
 )
 from hil.identification.dataset import FASTEST_OBSERVER_S, Dataset
-from hil.identification.followed import behind_motor
+from hil.identification.followed import behind_motor, second_encoder
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import inertia
 from hil.identification.residuals import Residuals, differences
@@ -252,8 +252,8 @@ class Hypothesis:
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
     ) -> dict[str, FloatArray]:
-        """Measured less twin, blocks fed measured inputs, per channel (n,); 0: hidden. The motor rests as in `rests`."""
-        return self.driven(run, observer_s, fast, rests) | behind_motor(self, run, fast, rests)
+        """Measured less twin, blocks fed measured inputs, per channel (n,); 0: hidden. At rest where `rests` is."""
+        return self.driven(run, observer_s, fast, rests) | behind_motor(self, run, observer_s, fast, rests)
 
     def driven(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
@@ -278,7 +278,8 @@ class Hypothesis:
             elif data.apart:
                 own = inertia(self.resolved.bench)
                 channels = [
-                    {name: one.of(name, values, own) for name, values in free.items()} | behind_motor(self, run, fast)
+                    {name: one.of(name, values, own) for name, values in free.items()}
+                    | second_encoder(self, run, data.observer_s, fast)
                     for one, run in zip(data.apart, runs, strict=True)
                     for free in [self.driven(one.smooth, data.observer_s, fast, rests=run)]
                 ]

@@ -12,11 +12,10 @@ with springs by generalised least squares. The noise of a torque drives a twin, 
 prefers an axis that answers less: more inertia, a resonance, a lag (errors in variables; W. E. Deming, Statistical
 Adjustment of Data, 1943). Times the inertia, e of a rigid axis is the torque that it lacks, with the same noise for
 every hypothesis. What is left enters as it was measured, through the mean K of the measured motion; what a hypothesis
-lacks passes the same mean. A resonance would pass less of the noise: there it goes through the
-reference alone. No torque is in a second encoder behind the measured motor (`hil.identification.followed`). So a fit is
-least squares of the torque; w whitens it by the autoregressive model of what the plain model leaves, so that slow
-errors do not hide a faster effect, and g keeps the rms of e(theta0; measured). About a reversal smoothed motion tells
-nothing.
+lacks passes the same mean. A resonance would pass less of the noise: there it goes through the reference alone. A
+second encoder tells springs by the motion that was measured. So a fit is least squares of the torque; w whitens it by
+the autoregressive model of what the plain model leaves, so that slow errors do not hide a faster effect, and g keeps
+the rms of e(theta0; measured). About a reversal smoothed motion tells nothing.
 """
 
 from collections.abc import Sequence
@@ -41,7 +40,7 @@ from hil.identification.whitening import RANK, filtered, whitening_filter
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
     """The recordings of a data set with the noise of their torque and motion apart, by the twin of a reference.
 
-    The motion is the intended one; of an axis with springs, whose table follows the measured motion, the smoothed one.
+    The motion is the intended one; of an axis with springs the smoothed one.
     """
     return replace(data, apart=tuple(_apart(data, run, reference, plain) for run in data.runs))
 

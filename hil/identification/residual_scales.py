@@ -22,6 +22,7 @@ from hil.identification.measured import Measured
 from hil.identification.sensor_noise import is_held
 from hil.identification.standstill import creeping, resting
 from hil.twin.axis import Response, Start
+from hil.twin.stepping.loops import LEAST_TICKS
 
 # Torque resolved by the motor channel over the noise of the torque channel. A fine encoder resolves less, but there lie
 # details below the material size too: friction at zero speed, the side force of a lead error.
@@ -31,6 +32,7 @@ TORQUE_ACCURACY = 1.0
 # 0.1 to 0.6 % in accelerations. On the motor, TORQUE_ACCURACY stands for it.
 DISCREPANCY = 0.005
 
+_FASTEST = 1.0 + 1e-9  # of the fastest observer: rounding
 _NEAR_ROWS = 21  # within which a motor that is not at rest passes more than a step
 _REMEMBERED_S = 0.3  # of an impulse: elastic modes of a machine axis have decayed
 _LAGS = 9  # rows of the command from one ahead on: the answer of a second inertia to a step begins within them
@@ -57,9 +59,14 @@ def factor_of_masses(bench: Bench, wanted: float) -> float:
     return 1.0 + (wanted - light) / (heavy - light) if heavy > light else 1.0
 
 
-def follows(run: Measured, springs: bool) -> bool:
-    """True where the second encoder is judged behind the measured motor: springs, driven by a torque with noise."""
-    return springs and bool(run.table_m.size) and run.observability.noisy_torque_input
+def follows(run: Measured, springs: bool, observer_s: float) -> bool:
+    """True where the second encoder is judged behind the measured motor.
+
+    An axis with springs is driven by a torque with noise, and its motor's encoder is finer: even the fastest observer
+    takes more noise from the torque.
+    """
+    fine = observer_s <= _FASTEST * LEAST_TICKS * run.period_s
+    return springs and fine and bool(run.table_m.size) and run.observability.noisy_torque_input
 
 
 def scales(
@@ -200,6 +207,6 @@ def impulse_responses(run: Measured, bench: Bench, observer_s: float) -> dict[st
     kicked = twin.observe(still, still, measured._replace(torque_command=np.eye(1, ticks, 1)[0]), start)
     moved = kicked.motor_position - quiet.motor_position
     responses = {"motor": moved[1:]}
-    if run.table_m.size and not follows(run, bool(bench.axis.SPRINGS)):
+    if run.table_m.size and not follows(run, bool(bench.axis.SPRINGS), observer_s):
         responses["table"] = (kicked.table_position_m - quiet.table_position_m - ratio * moved)[1:]
     return responses

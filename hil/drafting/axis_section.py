@@ -11,8 +11,8 @@ from hil.identification.least_squares import SIGMAS, Estimate
 from hil.quantities import ROTARY_LEAD_M, digits, unit_of
 from hil.recording.recording import Recording
 
-# Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
 _STIFFNESS = ("stiffness_n_m", "stiffness_n_m_rad")
+# Least deflection over acceleration that is a spring: a mode at 5 kHz, beyond any control loop.
 _STIFFEST_S2 = (2.0 * pi * 5e3) ** -2
 
 
@@ -55,8 +55,9 @@ def draft_axis(
     split = split_of(plant.inertia, recording, lead.value, turns)
     axis = _with_friction_of_load(drafted(split), plant, transmission, lead)
     share = axis.share_of_load
-    if share is not None and share.value > 1.0 and not split.told:  # a spring as stiff as that has a lighter load
-        axis = _with_friction_of_load(drafted(split.with_load(0.5 / share.value)), plant, transmission, lead)
+    by_sag = turns and _sagging(plant, transmission) is not None  # then the spring is told without a split
+    if share is not None and share.value > 1.0 and not (split.told or by_sag):
+        axis = _with_friction_of_load(drafted(split.lighter(0.5 / share.value)), plant, transmission, lead)
         share = axis.share_of_load
     return replace(axis, share_of_load=None if share is None else replace(share, value=min(share.value, 1.0)))
 
@@ -111,7 +112,7 @@ def _screw(plant: PlantValues, deflection: Estimate | None, lead: Estimate, spli
         estimated("stiffness_n_m", _stiffness(table, deflection), "N/m", "for this split"),
     ]
     told = "the sum of the masses and table mass over stiffness"
-    held = ("table_mass_kg",) if split.told else ()
+    held = ("table_mass_kg",) if split.held else ()
     return AxisDraft("two_mass", [*values, *elastic, *_rotary_friction(plant)], _unsure(elastic, told, split), held)
 
 
@@ -151,13 +152,13 @@ def _turning(
         estimated("stiffness_n_m_rad", stiffness, "N m/rad"),
     ]
     told = "the sum of the inertias at the motor and load inertia over stiffness"
-    held = ("load_inertia_kg_m2",) if split.told else ()
+    held = ("load_inertia_kg_m2",) if split.held else ()
     return AxisDraft("rotary_two_mass", [*values, *elastic, *friction], _unsure(elastic, told, split), held)
 
 
 def _unsure(elastic: list[BenchValue], told: str, split: Split) -> tuple[str, ...]:
     keys = ", ".join(one.key for one in elastic)
-    return (f"{keys}: told are {told}{f'; {split.how}' if split.told else ''}",)
+    return (f"{keys}: told are {told}; {split.how}",)
 
 
 def _stiffness(mass: Estimate, deflection: Estimate) -> Estimate:

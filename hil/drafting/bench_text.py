@@ -15,7 +15,7 @@ def bench_text(draft: BenchDraft) -> str:
     lines += [f"# Please check: {note}" for note in draft.unsure]
     lines += ["schema_version: 1", f"name: {_name(draft.name)}", "axis:", f"  model: {axis.model}"]
     lines += [f"  {_line(value)}" for value in axis.values]
-    held = f"  held: [{', '.join(axis.held)}]   # the owner's value; without this line it is fitted too"
+    held = f"  held: [{', '.join(axis.held)}]   # as the owner tells; without this line it is fitted too"
     lines += [held] if axis.held else []
     if draft.control:
         lines += ["control:", *(f"  {_line(value)}" for value in draft.control)]

@@ -146,12 +146,14 @@ def _friction_of_load(draft: BenchDraft) -> None:
     share, viscous = draft.axis.share_of_load, draft.axis.viscous_share
     if share is None:
         return
+    draft.unsure.append("friction of the load: what the encoders differ between directions may be lost motion, too")
     for mechanism, one in ((table_side_friction, share), (table_side_viscous_friction, viscous)):
         if one is None:
             continue
         beyond = one.value - share.value
         rest = 1.0 - share.value if beyond > 0.0 else share.value
-        more = one if one is share else replace(one, value=beyond / rest if rest else 0.0)
+        part = Estimate(beyond / rest, one.std_error / rest, one.how) if rest else replace(one, value=0.0)
+        more = one if one is share else part
         (name,) = (parameter.name for parameter in mechanism.MECHANISM.parameters)
         draft.mechanisms[mechanism.MECHANISM.id] = [estimated(name, more, "of the friction")]
 

@@ -5,7 +5,7 @@ owner says of them does, a few per cent off. Of two that are told the ratio coun
 """
 
 from dataclasses import replace
-from math import pi
+from math import hypot, pi
 from typing import NamedTuple
 
 from hil.identification.least_squares import Estimate
@@ -19,18 +19,19 @@ _LEAST = 1e-3  # share of a part: less is an error of a unit, or of the sum
 
 
 class Split(NamedTuple):
-    """Parts of a total, motor first; `how` they were found, `told`: by the owner."""
+    """Parts of a total, motor first; `how` they were found; `told` by the owner, of them the load itself is `held`."""
 
     motor: Estimate
     load: Estimate
     how: str
-    told: bool
+    told: bool = False
+    held: bool = False
 
-    def with_load(self, factor: float) -> "Split":
-        """The same total with the load times a factor."""
+    def lighter(self, factor: float) -> "Split":
+        """The same total with the load times a factor, as the friction of the load asks for."""
         load = self.load.scaled(factor)
         motor = replace(self.motor, value=self.motor.value + self.load.value - load.value)
-        return self._replace(motor=motor, load=load)
+        return Split(motor, load, "not told; of a load as heavy as the motor the friction would be more than all")
 
 
 def nominal_sum(recording: Recording, lead_m: float, turns: bool) -> Estimate | None:
@@ -50,14 +51,18 @@ def split_of(total: Estimate, recording: Recording, lead_m: float, turns: bool) 
     """Parts of a total inertia, in units of the motor [kg m^2]: by the owner's words, else half and half."""
     motor, load = _parts(recording, lead_m, turns)
     share = load / (load + motor) if load and motor else load / total.value if load else 1.0 - motor / total.value
-    if not (load or motor) or not _LEAST < share < 1.0 - _LEAST:
+    told = recording.metadata.get(NOMINAL_MASSES, {})
+    of = (Constant.LOAD_INERTIA if turns else Constant.LOAD_MASS, Constant.MOTOR_INERTIA)
+    words = ", ".join(
+        f"{quantity(told[key], unit)} {whose}" for key, whose, unit in _WORDS if key in of and key in told
+    )
+    if not words or not _LEAST < share < 1.0 - _LEAST:
         half = replace(total.scaled(0.5), std_error=0.5 * total.value)  # as large as the half itself
-        return Split(half, half, "half of the sum: the split is not told", False)
-    error = _OWNER * min(share, 1.0 - share) * total.value
+        refused = f"what the owner tells does not fit it: {words}" if words else "the split is not told"
+        return Split(half, half, f"half of the sum: {refused}")
+    error = hypot(_OWNER * min(share, 1.0 - share) * total.value, total.std_error)
     motor_part, load_part = (replace(total, value=one * total.value, std_error=error) for one in (1.0 - share, share))
-    told = recording.metadata[NOMINAL_MASSES]
-    words = [f"{quantity(told[key], unit)} {of}" for key, of, unit in _WORDS if key in told]
-    return Split(motor_part, load_part, f"split of the sum as the owner tells: {', '.join(words)}", True)
+    return Split(motor_part, load_part, f"split of the sum as the owner tells: {words}", True, bool(load))
 
 
 _WORDS = (

@@ -68,7 +68,7 @@ def _window(run: Measured) -> int:
 
 
 def _with_heavy_motor(chain: Chain) -> Chain:
-    """The chain with a heavy motor and the same springs and dampers."""
+    """The chain with a heavy motor, the same springs, and what its dampers make of each mode (of two masses exact)."""
     own = modal(chain)
     damping = own.shape @ np.diag(2.0 * own.damping_ratio * own.frequency_rad_s) @ own.shape.T
     damping = chain.inertia_kg_m2 @ damping @ chain.inertia_kg_m2

@@ -8,7 +8,7 @@ name. The way per turn of the motor goes before all other words of a lead, which
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,8 @@ _DEVIATES = re.compile(
     r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
     r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"
 )
+_SENTENCES = re.compile(r"(?<!\bca)(?<!\bapprox)(?<!\babt)[.;!?](?:\s|$)")
+_GROUPED = re.compile(r"\d{1,3}(?:[.,]\d{3})+(?:[.,]\d+)?")  # 1,200 is 1200 or 1.2
 _THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+")  # or a decimal comma
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
@@ -66,7 +68,7 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     # what is said of the motor goes before what words say, and that before what a unit alone says
     found: dict[Constant, dict[tuple[bool, bool], list[HeaderValue]]] = {}
     for one in given:
-        if mass := mass_told(one.words, one.number, one.units):
+        if mass := mass_told(one):
             found.setdefault(mass[0], {}).setdefault((False, True), []).append(HeaderValue(mass[1], one.text))
             continue
         units = one.units if any(one.units) else (*one.units, None)
@@ -101,7 +103,8 @@ def _statements(line: str) -> Iterator[Statement]:
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
             yield lead
         if re.search(r"[^\W\d]", before):
-            yield _words_before(before, value, behind, header_text(line))
+            told = _words_before(before, value, behind, header_text(line))
+            yield replace(told, grouped=bool(_GROUPED.fullmatch(match[0])))
 
 
 def _words_before(before: str, value: float, behind: str, line: str) -> Statement:
@@ -114,7 +117,8 @@ def _words_before(before: str, value: float, behind: str, line: str) -> Statemen
     words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
     if unit and not any(units_behind) and not bracket:
         words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
-    return Statement(words, value, (*units, *units_behind), line, phrase)
+    sentence = _plain(_SENTENCES.split(told)[-1])
+    return Statement(words, value, (*units, *units_behind), line, phrase, sentence)
 
 
 def _lead_behind(before: str, value: float, text: str, line: str) -> Statement | None:
@@ -187,10 +191,15 @@ def _constant(told: Statement, unit: str | None) -> tuple[bool, Constant, float]
 
 
 def _says_all(known: ConstantWords, words: str) -> bool:
-    """True if words that end a text are more than a short symbol, or the symbol of a torque or force constant."""
+    """True if words that end a text are more than a short symbol, or the symbol of a torque or force constant.
+
+    A percentage of a rated value says not of which.
+    """
     match = re.search(_pattern(known), words)
     found = match[1].replace(" ", "") if match else ""
-    return len(found) > _SYMBOL or (found in lexicon().scalars.constant and found != "km")
+    return (len(found) > _SYMBOL and not found.startswith("percent")) or (
+        found in lexicon().scalars.constant and found != "km"
+    )
 
 
 def _of_ratio(value: float, unit: str) -> tuple[Constant, float] | None:

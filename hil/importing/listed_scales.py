@@ -42,7 +42,7 @@ class ListedScales:
 def rest_of_channel(line: str, name: str) -> str | None:
     """Text of a line behind the `name` of a channel with which it begins, perhaps after a word such as "Channel 1";
     None if it begins otherwise. A name with a digit is no word of a sentence: a blank may follow it."""
-    behind = r"(?:\s*[:=;,\t|]\s*|\s+)" if re.search(r"\d", name) else r"\s*[:=;,\t|]\s*"
+    behind = r"(?:\s*[:=;,\t|]\s*|\s+)" if re.fullmatch(r"[^\W\d]+\d+", name) else r"\s*[:=;,\t|]\s*"
     match = re.match(
         rf"[\s\"#%/;!]*(?:(?:{'|'.join(lexicon().enumerated)})\s*\d*\"?\s*[:=;,\t|]\s*\"?)?"
         rf"{re.escape(name)}\"?{behind}(.*)$",

@@ -1,32 +1,35 @@
 """Masses and inertias that an owner tells in sentences: of the load, of the motor.
 
 "Table with fixture about 335 kg. Motor + coupling + screw about 2.8e-3 kg m2." Recordings tell their sum alone below
-the resonance of the transmission. The word nearest to the number tells whose it is; a sum of both tells nothing.
+the resonance of the transmission. Words between the last number and this one tell whose it is. A sum of both, a limit,
+a workpiece or a force tells nothing, nor does a number that may have thousands.
 """
 
 import re
-from collections.abc import Iterator
 
 from hil.importing.lexicon import Constant, lexicon
+from hil.importing.values_behind import Statement
 
 _SHORT = 4  # letters: a longer word may have another ending
-_BEGUN = re.compile(r"k?g[cm]?m")  # kg m: the unit goes on behind kg
+_GOES_ON = re.compile(r"k?g[cm]?m|kg(?:\+|plus).*")  # kg m, kg plus others
 
 
-def mass_told(words: str, value: float, units: tuple[str, ...]) -> tuple[Constant, float] | None:
-    """Constant and value [SI] of a number behind plain `words`, with texts that may be its unit, longest first."""
-    known = lexicon().masses
-    unit = next(iter(_read(units)), "")
+def mass_told(told: Statement) -> tuple[Constant, float] | None:
+    """Constant and value [SI] of a statement; None for one that tells neither mass nor inertia of one part."""
+    known, words = lexicon().masses, told.sentence.split()
     of_load, of_motor, of_neither = (
-        [place for place, word in enumerate(words.split()) if _is_one_of(word, some)]
+        [place for place, word in enumerate(words) if _is_one_of(word, some)]
         for some in (known.load, known.motor, known.neither)
     )
-    if not unit or not (of_load or of_motor) or of_neither or not value > 0.0:
+    if of_neither or not (of_load or of_motor) or told.grouped or not told.number > 0.0:
         return None
-    if factor := known.mass_units.get(unit):  # a slide with its motor slides
-        return (Constant.LOAD_MASS, factor * value) if of_load else None
-    nearest = max(of_load, default=-1) > max(of_motor, default=-1)
-    return (Constant.LOAD_INERTIA if nearest else Constant.MOTOR_INERTIA), known.inertia_units[unit] * value
+    unit = "" if any(map(_GOES_ON.fullmatch, told.units)) else next((one for one in told.units if _is_unit(one)), "")
+    if factor := known.mass_units.get(unit):
+        nearest = max(of_load, default=-1) > max(of_motor, default=-1)
+        return (Constant.LOAD_MASS, factor * told.number) if nearest else None
+    if not unit or (of_load and of_motor):  # a sum, or one seen from the other
+        return None
+    return (Constant.LOAD_INERTIA if of_load else Constant.MOTOR_INERTIA), known.inertia_units[unit] * told.number
 
 
 def _is_one_of(word: str, some: tuple[str, ...]) -> bool:
@@ -34,11 +37,5 @@ def _is_one_of(word: str, some: tuple[str, ...]) -> bool:
     return any(word == one or (len(one) > _SHORT and word.startswith(one)) for one in some)
 
 
-def _read(units: tuple[str, ...]) -> Iterator[str]:
-    """Units of a mass or an inertia among the texts; none behind one that goes on."""
-    known = lexicon().masses
-    for text in units:
-        if _BEGUN.fullmatch(text):
-            return
-        if text in known.mass_units or text in known.inertia_units:
-            yield text
+def _is_unit(text: str) -> bool:
+    return text in lexicon().masses.mass_units or text in lexicon().masses.inertia_units

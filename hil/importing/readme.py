@@ -15,6 +15,7 @@ from hil.importing.units import unit_named
 
 _WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
 _BEHIND_NAME = r"(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|\t\s*)"
+_FEWEST = 3  # columns that a sentence lists: fewer are words
 _LONGEST = 1_000_000  # bytes: no README is as long
 
 
@@ -64,17 +65,26 @@ def _listed(lines: Sequence[str], names: Sequence[str]) -> dict[str, tuple[str, 
     told = dict[str, tuple[str, str]]()
     for name in names:
         number = re.fullmatch(r"column (\d+)", name)  # of a file without a header
-        begin = rf"(?:column )?{number[1]}(?:[.):]\s*|\s+)" if number else rf"{re.escape(name)}{_BEHIND_NAME}"
-        found = (re.match(rf"[\s*•-]*{begin}(?=\S)(.*)", line, re.IGNORECASE) for line in lines if name)
+        begin = rf"(?:[Cc]olumn )?{number[1]}\s+" if number else rf"{re.escape(name)}{_BEHIND_NAME}"
+        found = (re.match(rf"[\s*•-]*{begin}(?=\S)(.*)", line) for line in lines if name)
         one = next((one for match in found if match and (one := _words_and_unit(match[1]))), None)
         told |= {name: one} if one else {}
     return told if len(told) > 1 else _in_a_row(" ".join(lines), names)
 
 
 def _in_a_row(text: str, names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """The same of columns that a sentence lists: "angle = table angle in degrees (0.001 deg), iq = current in A"."""
+    """The same of columns that a sentence lists: "angle = table angle in degrees (0.001 deg), iq = current in A".
+
+    Without signs between them they are in the order of the file: "t in s, q motor angle in degrees, M torque in Nm".
+    """
     places = [(match, name) for name in names if (match := re.search(rf"(?<!\w){re.escape(name)} = ", text))]
     places.sort(key=lambda place: place[0].start())
+    if not places:
+        found = [(re.search(rf"(?:^|[,;:.]\s+){re.escape(name)}\s+(?=\w)", text), name) for name in names]
+        places = [(match, name) for match, name in found if match]
+        begins = [match.start() for match, _ in places]
+        if len(places) < max(len(names), _FEWEST) or begins != sorted(begins):
+            return {}
     ends = [*(match.start() for match, _ in places), len(text)][1:]
     parts = {name: text[match.end() : end] for (match, name), end in zip(places, ends, strict=True)}
     told = {name: one for name, part in parts.items() if (one := _words_and_unit(re.split(r"[.](?:\s|$)", part)[0]))}
@@ -89,7 +99,8 @@ def _words_and_unit(text: str) -> tuple[str, str] | None:
 
 
 def _unit_at_an_end(phrase: str) -> str:
-    """Unit with which a phrase without numbers begins or ends, "torque in N m", "degrees of the joint"; "" without one.
+    """Unit with which a phrase without numbers begins or ends, "torque in N m", "degrees of the joint", or which stands
+    behind "in"; "" without one.
 
     A letter is a unit at the end only, and one beside another, or beside "per", is none.
     """
@@ -100,6 +111,9 @@ def _unit_at_an_end(phrase: str) -> str:
             return last
         if len(first) > 1 and _is_unit(first) and not _part_of_unit(words[take : take + 1]):
             return first
+        among = re.search(rf"\bin ((?:\S+ ){{{take - 1}}}\S+) (\S+)", phrase)  # torque in Nm at the shaft
+        if among and len(among[1]) > 1 and _is_unit(among[1]) and not _part_of_unit([among[2]]):
+            return among[1]
     return ""
 
 

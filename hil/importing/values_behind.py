@@ -21,6 +21,7 @@ _OF_FILE = re.compile(
 class Statement:
     """Words, the number that follows them, the texts that may be its unit, the whole text, and the last phrase.
 
+    `sentence` has the words of the last sentence alone. `grouped`: the number may have thousands.
     `of_motor`: it is a way, or counts, per turn of the motor. `weak`: what is said otherwise goes before it.
     """
 
@@ -29,6 +30,8 @@ class Statement:
     units: tuple[str, ...]
     text: str
     phrase: str = ""
+    sentence: str = ""
+    grouped: bool = False
     of_motor: bool = False
     weak: bool = False
 
@@ -40,7 +43,7 @@ def told_behind(before: str, value: float, text: str, line: str) -> Iterator[Sta
     if turn and _OF_COUNTS.search(before) and not _NO_COUNTS.search(before + text):
         yield Statement("", value, ("counts/rev",), line, of_motor=bool(turn[1]))
     second = _PER_SECOND.match(text)
-    if second and (second[1] != "samples" or _OF_FILE.search(before)):
+    if second and (second[1] == "rows" or _OF_FILE.search(before)):
         yield Statement("sample rate", value, ("hz",), line, weak=True)
     if period := _PER_ROW.match(text):
         yield Statement("sample time", value, (period[1],), line, weak=True)

@@ -64,7 +64,9 @@ def with_less_torque(given: Judged, other: Judged) -> Judged:
     Another that leaves the second encoder above its noise, and farther than the first does, is none.
     """
     left, less = (torque_missed(one.final, one.tested.searched.prepared.held_out) for one in (given, other))
-    before, after = (max(run.get(_TABLE, 0.0) for run in one.final.noise_ratios) for one in (given, other))
+    before, after = (
+        max((run.get(_TABLE, 0.0) for run in one.final.noise_ratios), default=0.0) for one in (given, other)
+    )
     worse = after > max(CRITERIA.floor, CRITERIA.worse * before)
     return other if left is not None and less is not None and less < left and not worse else given
 

@@ -28,6 +28,7 @@ def told(**nominal: float) -> Recording:
 def test_parts_that_are_told_make_up_the_sum(nominal: dict[str, float], load: float) -> None:
     split = split_of(TOTAL, told(**nominal), LEAD_M, turns=False)
     assert split.told
+    assert split.held == ("load_mass_kg" in nominal)
     assert split.load.value == pytest.approx(load)
     assert split.motor.value + split.load.value == pytest.approx(TOTAL.value)
     assert 0.0 < split.load.std_error < split.load.value
@@ -39,6 +40,7 @@ def test_parts_that_are_told_make_up_the_sum(nominal: dict[str, float], load: fl
 def test_parts_that_are_not_told_or_exceed_the_sum_are_halves(nominal: dict[str, float]) -> None:
     split = split_of(TOTAL, told(**nominal), LEAD_M, turns=False)
     assert not split.told
+    assert ("does not fit" in split.how) == bool({"load_mass_kg", "motor_inertia_kg_m2"} & set(nominal))
     assert split.load.value == split.motor.value == 5e-4 == split.load.std_error
 
 
@@ -48,7 +50,7 @@ def test_the_inertia_of_a_load_that_turns_is_geared() -> None:
 
 
 def test_a_lighter_load_leaves_the_sum() -> None:
-    split = split_of(TOTAL, told(), LEAD_M, turns=False).with_load(0.2)
+    split = split_of(TOTAL, told(), LEAD_M, turns=False).lighter(0.2)
     assert (split.load.value, split.motor.value) == pytest.approx((1e-4, 9e-4))
 
 

@@ -131,7 +131,7 @@ def test_columns_without_a_header_are_listed_by_their_numbers() -> None:
     lines = [
         "Four columns:",
         " 1 time in s",
-        " 2. encoder counts, 16384 counts per turn",
+        " 2 encoder counts, 16384 counts per turn",
         " 4 motor current in A (kt = 0.07)",
     ]
     told = _listed(lines, [f"column {number}" for number in range(1, 5)])
@@ -145,3 +145,19 @@ def test_columns_are_listed_in_a_sentence() -> None:
     ]
     told = _listed(lines, ["n", "angle", "iq"])
     assert {name: unit for name, (_, unit) in told.items()} == {"angle": "degrees", "iq": "A rms"}
+
+
+def test_columns_are_listed_in_the_order_of_the_file() -> None:
+    lines = [
+        "One joint. t in seconds (2000 rows/s), qm motor angle in degrees (before the gear, 131072 counts), ql encoder",
+        "after the gear in degrees (20 bit), tau motor torque in Nm at the shaft. Rated torque 0.5 Nm.",
+    ]
+    told = _listed(lines, ["t", "qm", "ql", "tau"])
+    assert {name: unit for name, (_, unit) in told.items()} == {
+        "t": "seconds",
+        "qm": "degrees",
+        "ql": "degrees",
+        "tau": "Nm",
+    }
+    assert _listed(lines, ["t", "ql", "qm", "tau"]) == {}
+    assert _listed(["The motor, a belt in mm, the table in s."], ["a", "the"]) == {}

@@ -22,12 +22,16 @@ from hil.identification.plain_model import shortest_window
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
+from hil.twin.library import BY_ID
+from hil.twin.mechanism import Stage
+from hil.twin.physics import Active
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import modal
 
 if TYPE_CHECKING:
     from hil.identification.hypothesis import Hypothesis
 
+_TORQUE = (Stage.CURRENT, Stage.TORQUE, Stage.MOTOR_TORQUE)
 _HEAVIER = 1e3  # motor over the axis: the spring moves it by a thousandth, which the observer takes back
 _MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
 
@@ -46,12 +50,18 @@ def behind_motor(
     chain = _with_heavy_motor(twin.physics.chain)
     acceleration = matched_motion(measured.motor_position, run.period_s, _window(run)).acceleration
     torque = float(chain.inertia_kg_m2.sum()) * acceleration
-    heavy = replace(twin, physics=replace(twin.physics, chain=chain))
+    active = tuple(one for one in twin.active if not _by_torque(one))
+    heavy = replace(twin, physics=replace(twin.physics, chain=chain), active=active)
     inputs = measured._replace(torque_command=torque, torque=torque)
     predicted = heavy.observe(
         run.position_command_m, run.velocity_command_m_s, inputs, run.start, rest, run.feedforward
     )
     return {"table": differences(measured, predicted, hypothesis.bench, run.evaluated)["table"]}
+
+
+def _by_torque(active: Active) -> bool:
+    """True for a mechanism of the motor's torque, or one that depends on it: it is not that of a heavy motor."""
+    return active.form.stage in _TORQUE or BY_ID[active.effect].under_torque
 
 
 def second_encoder(hypothesis: "Hypothesis", run: Measured, observer_s: float, fast: bool) -> dict[str, FloatArray]:

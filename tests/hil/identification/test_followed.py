@@ -14,11 +14,14 @@ from hil.bench.bench_file import load_bench
 from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.search.facts import axis_facts
 from hil.identification.dataset import Dataset
 from hil.identification.followed import _with_heavy_motor, second_encoder
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.residual_scales import follows
+from hil.identification.terms import Term
 from hil.recording.recording import read_recording
+from hil.twin.library import BY_ID
 from hil.twin.structure.modal import modal
 
 AXIS = TwoMassAxis(motor_kg=1.0, load_friction_n=24.0, motor_friction_n=2.0)
@@ -66,3 +69,14 @@ def test_a_light_motor_leaves_little_behind_it(drafted: Dataset) -> None:
     (run,), hypothesis = drafted.runs, Hypothesis(drafted.bench)
     left = second_encoder(hypothesis, run, drafted.observer_s, False)["table"][run.evaluated]
     assert float(np.std(left)) < 3.0 * run.noise.table_m
+
+
+@pytest.mark.parametrize(
+    "effect", ["torque_constant_saturation", "torque_saturation", "torque_ripple", "cogging_torque"]
+)
+def test_what_changes_the_torque_alone_is_not_in_the_second_encoder(drafted: Dataset, effect: str) -> None:
+    (run,), hypothesis = drafted.runs, Hypothesis(drafted.bench)
+    values = BY_ID[effect].typical_values(axis_facts(drafted.bench, drafted.runs))
+    with_term = hypothesis.with_term(Term(effect, 0, values))
+    left, without = (second_encoder(one, run, drafted.observer_s, False)["table"] for one in (with_term, hypothesis))
+    np.testing.assert_allclose(left, without, atol=0.01 * run.noise.table_m)

@@ -65,6 +65,7 @@ def test_the_second_encoder_tells_spring_and_friction_behind_the_motor(
     assert shares(fit.bench)[0] == pytest.approx(18.0 / 24.0, abs=0.05)
 
 
+@pytest.mark.long
 def test_noise_of_the_torque_is_not_in_the_second_encoder(tmp_path: Path) -> None:
     left = []
     for noise_n_m in (0.005, 0.2):

@@ -39,6 +39,7 @@ from hil.identification.torque_left import fit_plain, needed_torque, torque_devi
 from hil.quantities import digits, quantity, reading_unit
 
 TORQUE, DIFFERENCE = "torque", "difference"  # needed beyond the twin's; of the encoders, beyond the twin's
+DRIVEN = "difference of the driven twin"  # of the encoders, by the twin that the measured torque moves
 _SECONDS = dict.fromkeys(("N m", "N", "V"), "s")
 # Coefficients of the plain model, and their units on axes whose torque is in N m, N, or V.
 _COEFFICIENTS = {
@@ -194,10 +195,11 @@ def left_in_channel(
     """Residuals of a channel and the rows in which the axis slides, for each run; `fast`: in the steps of a search."""
     if channel == TORQUE:
         return needed_torque(hypothesis, data, plain, fast)
+    residuals = hypothesis.driven if channel == DRIVEN else hypothesis.blocks
     return [
         ResidualSeries(left["table"], measured_motion(run).sliding(plain.slowest))
         for run in data.runs
-        for left in [hypothesis.blocks(run, data.observer_s, fast)]
+        for left in [residuals(run, data.observer_s, fast)]
     ]
 
 

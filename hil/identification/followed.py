@@ -22,8 +22,7 @@ from hil.identification.plain_model import shortest_window
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
-from hil.twin.library import BY_ID
-from hil.twin.mechanism import Stage
+from hil.twin.mechanism import Moment, Stage
 from hil.twin.physics import Active
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import modal
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from hil.identification.hypothesis import Hypothesis
 
 _TORQUE = (Stage.CURRENT, Stage.TORQUE, Stage.MOTOR_TORQUE)
+_MEMORY = 64  # values that a friction may remember, at most
 _HEAVIER = 1e3  # motor over the axis: the spring moves it by a thousandth, which the observer takes back
 _MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
 
@@ -60,8 +60,13 @@ def behind_motor(
 
 
 def _by_torque(active: Active) -> bool:
-    """True for a mechanism of the motor's torque, or one that depends on it: it is not that of a heavy motor."""
-    return active.form.stage in _TORQUE or BY_ID[active.effect].under_torque
+    """True for a mechanism of the motor's torque, or friction that depends on it: it is not that of a heavy motor."""
+    if active.form.stage is not Stage.COULOMB:
+        return active.form.stage in _TORQUE
+    values, memory = np.array(active.values, dtype=np.float64), np.zeros(_MEMORY)
+    moments = (Moment(0.0, 0.0, 1e-3, 1e-3, 0.0, 1.0, 0.0, 1.0, 0.0, torque) for torque in (0.0, 1.0))
+    without, other = (active.form.contribution(1.0, at, values, memory) for at in moments)
+    return bool(without != other)
 
 
 def second_encoder(hypothesis: "Hypothesis", run: Measured, observer_s: float, fast: bool) -> dict[str, FloatArray]:

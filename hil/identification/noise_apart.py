@@ -31,8 +31,8 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.intended_motion import intended_motion, measured_motion, motion_of_set_points
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
-from hil.identification.plain_model import PlainModel, plain_columns
-from hil.identification.residual_scales import inertia
+from hil.identification.plain_model import PlainModel, noiseless_motion, plain_columns
+from hil.identification.residual_scales import follows, inertia
 from hil.identification.torque_left import observed
 from hil.identification.whitening import RANK, filtered, whitening_filter
 
@@ -40,14 +40,16 @@ from hil.identification.whitening import RANK, filtered, whitening_filter
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
     """The recordings of a data set with the noise of their torque and motion apart, by the twin of a reference.
 
-    The motion is the intended one; of an axis with springs the smoothed one.
+    The motion is the intended one; of an axis with springs the smoothed one, or where the
+    encoder of its motor is fine the measured one.
     """
     return replace(data, apart=tuple(_apart(data, run, reference, plain) for run in data.runs))
 
 
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel) -> NoiseApart:
     own, springs = measured_motion(run), bool(reference.bench.axis.SPRINGS)
-    moved = None if springs else motion_of_set_points(run)
+    fine = follows(run, springs, data.observer_s)  # an encoder that needs no mean
+    moved = noiseless_motion(run.motor, run.period_s) if fine else None if springs else motion_of_set_points(run)
     moved, rows = moved or own.moved, own.sliding(plain.slowest)
     taps, gain, window = np.ones(1), 1.0, 0
     needed = np.where(rows, plain.predict(moved), run.torque) if springs else plain.predict(moved)
@@ -55,7 +57,7 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     measured, free = (reference.driven(one, data.observer_s, rests=run) for one in (run, smooth))
     noise, of_reference = {name: measured[name] - free[name] for name in measured}, inertia(reference.resolved.bench)
     if rows.any():
-        of_model, a = plain.predict(own.moved), run.period_s / data.observer_s
+        of_model, a = plain.predict(moved if fine else own.moved), run.period_s / data.observer_s
         taps, left = _whitened(np.where(rows, run.torque - of_model, 0.0), moved, rows, plain, a)
         if springs:
             noise["motor"] = (

@@ -174,7 +174,6 @@ class Mechanism:
     over_time: Callable[[FloatArray, float, Sequence[float]], FloatArray] | None = None
     turning: bool = False  # only where the load turns
     softens: bool = False  # changes the stiffness of a spring of the chain
-    under_torque: bool = False  # depends on the torque of the motor (`Moment.torque`)
     most: int = 1  # number that may act at once, with periods or orders of their own, or as different variants
 
     @property

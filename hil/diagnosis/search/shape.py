@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from hil.arrays import FloatArray
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.search.facts import axis_facts
-from hil.diagnosis.structure_left import DIFFERENCE, TORQUE, channels, least_energy, left_in_channel
+from hil.diagnosis.structure_left import DRIVEN, TORQUE, channels, least_energy, left_in_channel
 from hil.identification.coefficient import Coefficient, coefficients, log_tail
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion, matched_motion
@@ -32,6 +32,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.intended_motion import intended_motion, measured_motion
 from hil.identification.noise_apart import intended_runs, smoothed_runs
 from hil.identification.plain_model import MOTION, PlainModel, plain_columns
+from hil.identification.residual_scales import follows
 from hil.identification.structure import ResidualSeries
 from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain, quiet_motion
@@ -195,15 +196,18 @@ def _asked(without: Fit, fast: bool) -> tuple[PlainModel | None, list[_Asked]]:
     """The plain model, and the residuals of a fit in which shapes are sought; no model if the axis never slides.
 
     The torque is asked twice: with the measured motion, and with the smoothed one, in which the noise of the encoder
-    does not hide a torque that is faster than the twin's observer. A channel that is set aside tells nothing.
+    does not hide a torque that is faster than the twin's observer. A second encoder that is judged behind the motor is
+    asked once more for what torque deflects the springs. A channel that is set aside tells nothing.
     """
     data, found = without.data, list[_Asked]()
     plain = fit_plain(data)
     if plain is None:
         return None, found
     smooth = quiet_motion(data)
-    for channel in channels(data):
-        if channel == DIFFERENCE and "table" in data.set_aside:
+    springs = bool(without.bench.axis.SPRINGS)
+    behind = all(follows(run, springs, data.observer_s) for run in data.runs)
+    for channel in (*channels(data), *([DRIVEN] if behind else [])):
+        if channel != TORQUE and "table" in data.set_aside:
             continue
         calm = data.over((intended_runs if channel == TORQUE else smoothed_runs)(data.runs, plain))
         quiet = left_in_channel(without.hypothesis, calm, channel, plain, fast)

@@ -35,5 +35,4 @@ MECHANISM = Mechanism(
         "Friction grows with the load: by a share of {share} of the torque that is carried.", Picture.FRICTION_OVER_LOAD
     ),
     search=SearchHints(lambda s: [(0.05,)], lambda a: (0.1,)),
-    under_torque=True,
 )

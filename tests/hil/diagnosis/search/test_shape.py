@@ -50,14 +50,14 @@ def apart(fit: Fit) -> Fit:
 
 @pytest.mark.parametrize(("terms", "told"), [((COGGING,), True), ((), False)])
 def test_a_shape_below_the_noise_is_told_where_it_is(terms: tuple[Term, ...], told: bool) -> None:
-    without = base(*terms)
+    without = apart(base(*terms))
     begun = without.estimator.evaluate(without.hypothesis.with_term(COGGING))
     assert (log_chance_of_shape(begun.hypothesis, without) < NEEDED) == told
     assert bool(shown(without, [Candidate(COGGING, 0.0)])) == told
 
 
 def test_a_shape_of_the_opposite_sign_is_told_only_before_it_is_fitted() -> None:
-    without = base(COGGING)
+    without = apart(base(COGGING))
     opposite = replace(COGGING, values=(0.05, 6.0, 0.4 + math.pi))
     begun = without.estimator.evaluate(without.hypothesis.with_term(opposite))
     assert log_chance_of_shape(begun.hypothesis, without) > math.log(0.5)

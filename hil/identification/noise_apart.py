@@ -26,12 +26,12 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.identification.dataset import Dataset, NoiseApart
-from hil.identification.derivatives import MeasuredMotion, later_motion
+from hil.identification.derivatives import MeasuredMotion, later_motion, matched_motion
 from hil.identification.hypothesis import Hypothesis
 from hil.identification.intended_motion import intended_motion, measured_motion, motion_of_set_points
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
-from hil.identification.plain_model import PlainModel, noiseless_motion, plain_columns
+from hil.identification.plain_model import PlainModel, plain_columns, shortest_window
 from hil.identification.residual_scales import follows, inertia
 from hil.identification.torque_left import observed
 from hil.identification.whitening import RANK, filtered, whitening_filter
@@ -49,7 +49,7 @@ def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Data
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel) -> NoiseApart:
     own, springs = measured_motion(run), bool(reference.bench.axis.SPRINGS)
     fine = follows(run, springs, data.observer_s)  # an encoder that needs no mean
-    moved = noiseless_motion(run.motor, run.period_s) if fine else None if springs else motion_of_set_points(run)
+    moved = _little_noise(run, plain) if fine else None if springs else motion_of_set_points(run)
     moved, rows = moved or own.moved, own.sliding(plain.slowest)
     taps, gain, window = np.ones(1), 1.0, 0
     needed = np.where(rows, plain.predict(moved), run.torque) if springs else plain.predict(moved)
@@ -69,6 +69,12 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     apart = NoiseApart(smooth, rows, noise, measured, of_reference, taps, gain, window)
     least = rms(apart.of("motor", free["motor"], of_reference)[rows]) if rows.any() else 0.0
     return apart._replace(gain=rms(measured["motor"][rows]) / least) if least else apart
+
+
+def _little_noise(run: Measured, plain: PlainModel) -> MeasuredMotion:
+    """The measured motion through the shortest mean that leaves the torque of its noise small beside that measured."""
+    window = shortest_window(run.motor, run.period_s, run.noise.torque / abs(plain["inertia"].value))
+    return matched_motion(run.motor, run.period_s, min(window, measured_motion(run).window))
 
 
 def _driven(run: Measured, torque: FloatArray) -> Measured:

@@ -117,19 +117,25 @@ def noiseless_motion(position: FloatArray, period_s: float) -> MeasuredMotion:
     return matched_motion(position, period_s, shortest_window(position, period_s))
 
 
-def shortest_window(position: FloatArray, period_s: float) -> int:
-    """Rows of the shortest window in which the acceleration of a position (n,) has little noise."""
-    return _window(position, _noise(position)[1], period_s, 0.0)
+def shortest_window(position: FloatArray, period_s: float, most: float = np.inf) -> int:
+    """Rows of the shortest window in which the acceleration of a position (n,) has little noise.
+
+    `most`: white noise that an acceleration may have without the window, by which little is measured where it is less.
+    """
+    return _window(position, _noise(position)[1], period_s, 0.0, most)
 
 
-def _window(position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S) -> int:
+def _window(
+    position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S, most: float = np.inf
+) -> int:
     """Rows of the shortest window that passes little noise: longer ones leave less motion between reversals."""
     window = best = max(round(shortest_s / period_s) | 1, 3)
     least = np.inf
     while least == np.inf or (window <= position.size // 4 and window * period_s <= LONGEST_S):
         inner = slice(window, -window) if position.size > 3 * window else slice(None)
         acceleration = matched_motion(position, period_s, window).acceleration[inner]
-        share = (noise * noise_gains(period_s, window)[2]) ** 2 / max(float(np.var(acceleration)), 1e-300)
+        passed, _, gain = noise_gains(period_s, window)
+        share = (noise * gain) ** 2 / max(min(float(np.var(acceleration)), (most * passed) ** 2), 1e-300)
         if share < least:
             best, least = window, share
         if share < _NOISE_SHARE:

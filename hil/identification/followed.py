@@ -18,10 +18,10 @@ import numpy as np
 from hil.arrays import FloatArray
 from hil.identification.derivatives import matched_motion
 from hil.identification.measured import Measured
-from hil.identification.plain_model import shortest_window
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
+from hil.identification.windows import shortest_window
 from hil.twin.mechanism import Moment, Stage
 from hil.twin.physics import Active
 from hil.twin.structure.chain import Chain

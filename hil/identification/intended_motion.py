@@ -18,9 +18,10 @@ from scipy.signal import lfilter
 from hil.arrays import FloatArray
 from hil.identification.derivatives import MeasuredMotion, matched_motion
 from hil.identification.measured import Measured
-from hil.identification.plain_model import LONGEST_S, MotionData, motion_data, noiseless_motion
+from hil.identification.plain_model import MotionData, motion_data
 from hil.identification.sensor_noise import moving, white_noise
 from hil.identification.whitening import RANK
+from hil.identification.windows import LONGEST_S, noiseless_motion
 
 _LAGS_S = (0.004, 0.008, 0.016, 0.032, 0.064, 0.128)  # of a fast loop to one without feed-forward and integrator
 _ANOTHER = 0.1  # of the variance of the acceleration: set-points that differ by more are a target, or not its own

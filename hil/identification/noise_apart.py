@@ -31,24 +31,25 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.intended_motion import intended_motion, measured_motion, motion_of_set_points
 from hil.identification.measured import Measured
 from hil.identification.noise_floor import rms
-from hil.identification.plain_model import PlainModel, plain_columns, shortest_window
+from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.residual_scales import follows, inertia
 from hil.identification.torque_left import observed
 from hil.identification.whitening import RANK, filtered, whitening_filter
+from hil.identification.windows import shortest_window
 
 
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
     """The recordings of a data set with the noise of their torque and motion apart, by the twin of a reference.
 
-    The motion is the intended one; of an axis with springs the smoothed one, or where the
-    encoder of its motor is fine the measured one.
+    The motion is the intended one; of an axis with springs the smoothed one, through a shorter mean where the encoder
+    of its motor is fine.
     """
     return replace(data, apart=tuple(_apart(data, run, reference, plain) for run in data.runs))
 
 
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel) -> NoiseApart:
     own, springs = measured_motion(run), bool(reference.bench.axis.SPRINGS)
-    fine = follows(run, springs, data.observer_s)  # an encoder that needs no mean
+    fine = follows(run, springs, data.observer_s)
     moved = _little_noise(run, plain) if fine else None if springs else motion_of_set_points(run)
     moved, rows = moved or own.moved, own.sliding(plain.slowest)
     taps, gain, window = np.ones(1), 1.0, 0

@@ -26,7 +26,6 @@ from scipy.special import ndtri, stdtrit
 
 from hil.arrays import FloatArray
 from hil.identification.derivatives import (
-    SMOOTH_S,
     MeasuredMotion,
     later_motion,
     matched,
@@ -37,14 +36,13 @@ from hil.identification.derivatives import (
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
 from hil.identification.parallel import one_blas_thread
 from hil.identification.torque_lag import shift_of_torque
+from hil.identification.windows import little_noise, position_noise
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
 _SLIDING = 0.02  # of the top speed: below, an axis may stick, and its motion does not tell its friction
 _OTHER_WAY = 2.0  # independent samples that tell the friction of slow motion the other way
 _FEWEST = len(MOTION) + 2  # independent samples: two more than coefficients
-_NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes the inertia too small by this share
-LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
 _LAW = ("slow", "fast")  # coefficients of a friction that bends at low and at high speed
 _BEND = 0.1  # of the top speed: range of speed in which a friction that falls from rest is felt
 _FARTHEST_ROWS, _FARTHEST_S = 8, 0.04  # lateness of a torque that is sought; the larger of both
@@ -102,62 +100,14 @@ class MotionData:
 
 def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judged: slice = slice(None)) -> MotionData:
     """Data of motor position and torque (n,), of the rows `judged` without half a window at both ends."""
-    noise, rms = _noise(position)
-    window = _window(position, rms, period_s)
+    noise, rms = position_noise(position)
+    window = little_noise(position, rms, period_s)
     rows, half = np.zeros(position.size, dtype=bool), window // 2 + 1
     rows[judged] = True
     rows[:half] = rows[-half:] = False
     return MotionData(
         matched_motion(position, period_s, window), matched(torque, window), rows, period_s, window, noise
     )
-
-
-def noiseless_motion(position: FloatArray, period_s: float) -> MeasuredMotion:
-    """Motion (n,) of a position that no sensor measured: its mean is over a few rows, where it has no noise at all."""
-    return matched_motion(position, period_s, shortest_window(position, period_s))
-
-
-def shortest_window(position: FloatArray, period_s: float, most: float = np.inf) -> int:
-    """Rows of the shortest window in which the acceleration of a position (n,) has little noise.
-
-    `most`: white noise that an acceleration may have without the window, by which little is measured where it is less.
-    """
-    return _window(position, _noise(position)[1], period_s, 0.0, most)
-
-
-def _window(
-    position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S, most: float = np.inf
-) -> int:
-    """Rows of the shortest window that passes little noise: longer ones leave less motion between reversals."""
-    window = best = max(round(shortest_s / period_s) | 1, 3)
-    least = np.inf
-    while least == np.inf or (window <= position.size // 4 and window * period_s <= LONGEST_S):
-        inner = slice(window, -window) if position.size > 3 * window else slice(None)
-        acceleration = matched_motion(position, period_s, window).acceleration[inner]
-        passed, _, gain = noise_gains(period_s, window)
-        share = (noise * gain) ** 2 / max(min(float(np.var(acceleration)), (most * passed) ** 2), 1e-300)
-        if share < least:
-            best, least = window, share
-        if share < _NOISE_SHARE:
-            break
-        window = 2 * window - 1
-    return best
-
-
-def _noise(position: FloatArray) -> tuple[float, float]:
-    """White noise of a position (n,): of even motion, the lower quarter, and rms of all.
-
-    From differences of the order that leaves less motion; one of order m has the variance (2 m)! / m!^2. Stamps that
-    are uneven make the noise of fast motion larger than that of even motion.
-    """
-    differences = [
-        np.diff(position, order) / np.sqrt(gain)
-        for order, gain in ((4, 70.0), (8, 12870.0))
-        if position.size > 2 * order
-    ]
-    even = min((float(np.quantile(np.abs(one), 0.25) / ndtri(0.625)) for one in differences), default=0.0)
-    rms = min((float(np.sqrt(np.mean(one**2))) for one in differences), default=0.0)
-    return even, rms
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import Asked, DraftedChannel, MapDraft, ask_column
 from hil.importing.map_file import ChannelSource
 from hil.importing.position_units import PositionUnits, effort_si
-from hil.importing.questions import effort_unit, position_unit, speed_unit
+from hil.importing.questions import counts_like, effort_unit, position_unit, speed_unit
 from hil.importing.relations import SAME_POSITION, derivative_of, driven, lateness_s, proportional
 from hil.importing.roles import Roles, may_be_asked
 from hil.importing.speed_unit import speed_entry
@@ -202,13 +202,12 @@ class ChannelEntries:
         same = abs(abs(factor) - 1.0) < SAME_COUNTS
         if unit == "counts" and self.unsized:  # its counts are told when those of the encoder are
             ratio = 1.0 if same else counts_ratio(abs(factor))
-            given = f"write the same as for {encoder}" if same else f"write {ratio:.6g} times that of {encoder}"
-            given += "; behind a gear times its ratio" if channel == "position_command_m" and same else ""
-            if channel == "table_position_m":
-                far = "" if same else "those per revolution of the load; on the motor's shaft "
-                given = f"write {far}{given[6:]}; of a linear scale counts_per_m, and lead_m above the line 'channels:'"
-            keys |= {key: size * ratio for key, size in self.unsized.items()}
-            self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {given}") for key in self.unsized]
+            sizes, told = {key: size * ratio for key, size in self.unsized.items()}, self.draft.table.constants
+            if channel == "table_position_m" and self.draft.lead_m and Constant.LEAD in told:
+                sizes = {"counts_per_m": max(sizes.values()) / self.draft.lead_m}
+            keys |= sizes
+            question = counts_like(encoder, channel, None if same else ratio, "counts_per_m" in sizes)
+            self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {question}") for key in sizes]
         elif unit == "counts" and channel == "table_position_m" and (count := self.positions.count_by_command(name)):
             keys |= count
         elif unit == "counts":  # of the motor's encoder, as in the set-points of a drive

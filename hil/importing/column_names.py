@@ -22,6 +22,7 @@ _MOTION = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 _BRACKET = re.compile(r"[\[({].*[\])}]")
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+(:\d+)?")
 _OBJECT = re.compile(r"(?<![0-9a-zA-Z])(?:0x)?(6[0-9a-fA-F]{3})h?(?![0-9a-zA-Z])")
+_IDENT = re.compile(r"(?<![0-9a-zA-Z])(S-0-\d{4})(?![0-9])", re.IGNORECASE)
 _INDEX = re.compile(r"[\[({]\s*(?:\w+\s*[,;:]\s*)?(\d+)\s*[\])}]\s*$")  # [2], (2), [u1, 2]
 _LINEAR_AXES, _AXES = "xyz", "xyzabcuvw"  # ISO 841
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
@@ -57,6 +58,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
 
     The unit of the name counts first, but for one of the cells themselves.
     """
+    words_beside = f"{words_beside} {_words_of_address(f'{column} {words_beside}')}".strip()
     name, unit, odd = split_unit(column.strip())
     if unit is None and not odd:
         name, unit = _unit_after_blank(name)
@@ -119,6 +121,12 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         _any(words, known.encoder),
         steps,
     )
+
+
+def _words_of_address(name: str) -> str:
+    """What the value is whose address in a drive is in a name, 0x6064 or S-0-0051; "" without one."""
+    address = _OBJECT.search(name) or _IDENT.search(name)
+    return lexicon().addresses.get(address[1].lower(), "") if address else ""
 
 
 def _unit_of_object(name: str) -> str | None:

@@ -118,7 +118,7 @@ def _text(path: Path) -> ForeignTable:
     of_list = {name: listed.scales[title] for name, title in titles.items() if title in listed.scales}
     header.row_scales = of_list | header.row_scales
     header.notes += listed.notes
-    applied = [name for name, scale in header.row_scales.items() if not _is_raw(read[name], *scale)]
+    applied = [name for name, scale in header.row_scales.items() if not is_raw(read[name], *scale)]
     header.scales |= {name: scale for name, scale in header.row_scales.items() if name not in applied}
     header.notes += [
         f"{name}: its values hold the factor {header.row_scales[name][0]:g} of the header already"
@@ -159,7 +159,7 @@ def _text(path: Path) -> ForeignTable:
     )
 
 
-def _is_raw(values: FloatArray, factor: float, offset: float) -> bool:
+def is_raw(values: FloatArray, factor: float, offset: float) -> bool:
     """True if a factor of the header is still to be applied to a column (n,): to whole numbers, as a drive has them."""
     given = values[np.isfinite(values)]
     whole = bool(np.all(given == np.round(given)))

@@ -162,12 +162,14 @@ class Lexicon(_Entry):
     angular_speed: Words
     length: Words
     units: dict[str, Words]
+    addresses: dict[str, str]
     objects: dict[Literal["permille"], Words]
     after_unit: Words
     of_rated: Words
     constants: dict[Constant, ConstantWords]
     other_constants: Words
     joints: Words
+    both: Words
     masses: MassWords
     scalars: ScalarNames
     series: SeriesWords

@@ -12,7 +12,8 @@ from hil.commands.import_ import import_
 from hil.errors import InputError
 from hil.explanation import explain
 from hil.importing.draft_map import draft_map
-from hil.importing.readme import FileHints, _listed
+from hil.importing.readme import FileHints
+from hil.importing.readme_columns import told_columns
 from hil.recording.recording import read_recording
 
 AXIS = axis()
@@ -118,11 +119,10 @@ def test_a_unit_stands_among_the_words_of_a_column(tmp_path: Path) -> None:
         ("second encoder", ""),
         ("position of the first turn", ""),
         ("angle, degrees of the joint", "degrees"),
-        ("5 um steps", ""),
     ],
 )
 def test_a_part_of_a_unit_is_none(words: str, unit: str) -> None:
-    told = _listed([f" a   {words}", " b - time s", " c   see below", " c   force, N"], ["a", "b", "c"])
+    told = told_columns([f" a   {words}", " b - time s", " c   see below", " c   force, N"], ["a", "b", "c"])
     assert told.get("a", ("", ""))[1] == unit
     assert (told["b"][1], told["c"][1]) == ("s", "N")
 
@@ -134,8 +134,12 @@ def test_columns_without_a_header_are_listed_by_their_numbers() -> None:
         " 2 encoder counts, 16384 counts per turn",
         " 4 motor current in A (kt = 0.07)",
     ]
-    told = _listed(lines, [f"column {number}" for number in range(1, 5)])
-    assert {name: unit for name, (_, unit) in told.items()} == {"column 1": "s", "column 2": "counts", "column 4": "A"}
+    told = told_columns(lines, [f"column {number}" for number in range(1, 5)])
+    assert {name: unit for name, (_, unit, _) in told.items() if unit} == {
+        "column 1": "s",
+        "column 2": "counts",
+        "column 4": "A",
+    }
 
 
 def test_columns_are_listed_in_a_sentence() -> None:
@@ -143,8 +147,8 @@ def test_columns_are_listed_in_a_sentence() -> None:
         "Columns: n = sample number, angle = table angle in degrees (ring encoder, 0.0001 deg),",
         "iq = current in A rms.",
     ]
-    told = _listed(lines, ["n", "angle", "iq"])
-    assert {name: unit for name, (_, unit) in told.items()} == {"angle": "degrees", "iq": "A rms"}
+    told = told_columns(lines, ["n", "angle", "iq"])
+    assert {name: unit for name, (_, unit, _) in told.items() if unit} == {"angle": "degrees", "iq": "A rms"}
 
 
 def test_columns_are_listed_in_the_order_of_the_file() -> None:
@@ -152,12 +156,68 @@ def test_columns_are_listed_in_the_order_of_the_file() -> None:
         "One joint. t in seconds (2000 rows/s), qm motor angle in degrees (before the gear, 131072 counts), ql encoder",
         "after the gear in degrees (20 bit), tau motor torque in Nm at the shaft. Rated torque 0.5 Nm.",
     ]
-    told = _listed(lines, ["t", "qm", "ql", "tau"])
-    assert {name: unit for name, (_, unit) in told.items()} == {
+    told = told_columns(lines, ["t", "qm", "ql", "tau"])
+    assert {name: unit for name, (_, unit, _) in told.items() if unit} == {
         "t": "seconds",
         "qm": "degrees",
         "ql": "degrees",
         "tau": "Nm",
     }
-    assert _listed(lines, ["t", "ql", "qm", "tau"]) == {}
-    assert _listed(["The motor, a belt in mm, the table in s."], ["a", "the"]) == {}
+    assert told_columns(lines, ["t", "ql", "qm", "tau"]) == {}
+    assert told_columns(["The motor, a belt in mm, the table in s."], ["a", "the"]) == {}
+
+
+def test_a_list_has_units_in_brackets_and_sizes_of_counts() -> None:
+    """As drives and data sheets write them; "0.1 % of" is a permille, and "both" is said of the column before, too."""
+    lines = [
+        "- lage_soll [mm], Sollwert",
+        "- motormoment [Nm] an der Motorwelle",
+        "- coppia_permille: coppia motore [0,1 % della coppia nominale], Cn = 1,27 Nm",
+        "- S-0-0047 position command, S-0-0051 position feedback 1 (motor encoder, 19 bit), both 0.0001 mm",
+        "- S-0-0040 velocity feedback, 0.0001 rpm (motor)",
+        "- mot_inc: motor encoder, 65536 increments per motor turn",
+    ]
+    names = ["lage_soll", "motormoment", "coppia_permille", "S-0-0047", "S-0-0051", "S-0-0040", "mot_inc"]
+    told = {name: (unit, step) for name, (_, unit, step) in told_columns(lines, names).items()}
+    assert told == {
+        "lage_soll": ("mm", 1.0),
+        "motormoment": ("Nm", 1.0),
+        "coppia_permille": ("0,1 %", 1.0),
+        "S-0-0047": ("mm", 1e-4),
+        "S-0-0051": ("mm", 1e-4),
+        "S-0-0040": ("rpm", 1e-4),
+        "mot_inc": ("", 1.0),
+    }
+
+
+def test_columns_without_a_header_stand_in_a_numbered_list() -> None:
+    lines = [
+        " 1. time [s]",
+        " 2. position command [mm]",
+        " 3. motor encoder [counts], 4194304 per revolution",
+        " 4. glass scale on the slide [counts], 0.2 um each, other zero than the motor",
+        " 5. actual torque [% of rated], rated torque 1.95 Nm",
+    ]
+    told = told_columns(lines, [f"column {number}" for number in range(1, 6)])
+    assert [one.unit for one in told.values()] == ["s", "mm", "counts", "um", "% of rated"]
+    assert told["column 4"].step == 0.2
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "um"), (0.001, None)])
+def test_a_step_is_that_of_whole_numbers(scale: float, unit: str | None, tmp_path: Path) -> None:
+    """An encoder of 5 um steps whose column is not counted in them has the unit of its column."""
+    counts = np.round(2e3 * AXIS["angle"])
+    columns = {"t": AXIS["t"], "pos_1": scale * counts, "M": AXIS["torque"]}
+    source, readme = write(tmp_path / "log.parquet", columns), tmp_path / "notes.txt"
+    readme.write_text("- pos_1 scale of the slide, 5 um steps\n- M force [N]\n- t time [s]\n")
+    entry = next(one.entry for one in draft_map(source, readme=readme).channels if one.entry["column"] == "pos_1")
+    assert (entry.get("scale"), entry["unit"]) == ((5.0, unit) if unit else (None, entry["unit"]))
+
+
+def test_counts_of_two_encoders_beside_a_lead_make_a_map_that_is_read(tmp_path: Path) -> None:
+    columns = {"t": AXIS["t"], "motor": np.round(1e4 * AXIS["angle"]), "scale": np.round(3e4 * AXIS["angle"])}
+    source, readme = write(tmp_path / "log.csv", columns | {"M": AXIS["torque"]}), tmp_path / "notes.txt"
+    readme.write_text("Ball screw, lead 5 mm\n")
+    draft = draft_map(source, readme=readme)
+    assert (draft.lead_m, {one.key for one in draft.asked}) == (0.005, {"counts_per_rev", "counts_per_m", "unit"})
+    assert explain(source, tmp_path / "explained", readme=readme).basis.unsized

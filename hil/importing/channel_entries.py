@@ -206,7 +206,7 @@ class ChannelEntries:
             if channel == "table_position_m" and self.draft.lead_m and Constant.LEAD in told:
                 sizes = {"counts_per_m": max(sizes.values()) / self.draft.lead_m}
             keys |= sizes
-            question = counts_like(encoder, channel, None if same else ratio, "counts_per_m" in sizes)
+            question = counts_like(encoder, channel, None if same else ratio, not set(sizes) <= set(self.unsized))
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {question}") for key in sizes]
         elif unit == "counts" and channel == "table_position_m" and (count := self.positions.count_by_command(name)):
             keys |= count

@@ -43,7 +43,8 @@ def _inputs(setpoints, k, motor, table):  # type: ignore[no-untyped-def]
 @njit(**COMPILE)
 def _correct(impulse, error, period, time_constant, delta):  # type: ignore[no-untyped-def]
     """Correct the state of one side of the transmission by the error of its position [motor units]: a Luenberger
-    observer. The side moves as one body: a motor alone would wind up its coupling."""
+    observer. The side moves as one body: a motor alone would wind up its coupling. So does the whole axis with a spring
+    whose mode is faster than the ticks, by which it would be excited (`hil.twin.stepping.records`)."""
     shift = 2.0 * period / time_constant * error
     kick = period / time_constant**2 * error
     for i in range(delta.shape[1]):
@@ -137,8 +138,8 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
     motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
     datum, settled, moved = 0.0, 0, 0
-    # a shift of the motor moves the table of a rigid axis with it: the motor alone holds it
-    rigid = along(shapes.table, shapes.motor_impulse) > 0.5
+    # share of a shift of the motor by which the table moves with it, 1 where the motor alone holds it
+    carried = along(shapes.table, shapes.motor_impulse)
     hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
@@ -147,8 +148,8 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
         error = measured_motor[k] - motor[k]
         _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
         own_table = table[k]
-        if not rigid:  # it follows the mean of a motor that is put back by 2 T / time constant x error at each tick
-            table[k] -= c.ratio * c.period / c.observer * error
+        # it follows the mean of a motor that is put back by 2 T / time constant x error at each tick
+        table[k] -= (1.0 - carried) * c.ratio * c.period / c.observer * error
         if measured_table.size:
             free = resting[k] or own.floating > 0.0
             apart = measured_table[k] - own_table - c.ratio * error
@@ -159,8 +160,8 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
                 # its first rest is the datum until motion gives a better one; not within a gap
                 settled += 1
                 datum += (apart - datum) / settled
-            if free and moved + settled > 0 and not rigid:
-                error = (measured_table[k] - datum - own_table) / c.ratio
+            if free and moved + settled > 0:
+                error = (1.0 - carried) * (measured_table[k] - datum - own_table) / c.ratio
                 _correct(shapes.table_impulse, error, c.period, hold, delta)
         if push.size:
             own.push = push[k]

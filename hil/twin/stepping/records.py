@@ -24,6 +24,7 @@ from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import Discrete, Modal, discretise, lowest_modes
 
 _ROUNDING = 1e-12  # of all damping: below, a whole axis as one side has only rounding of it
+_STEEP = 8  # a mode of a quarter turn per tick loses half a per cent, one of a whole turn all but that
 # The step is fine while motor or table moves slower than this, or could reverse within two ticks; the axis then rests
 # for the observer of its table. Alike for a lead of 10 mm; SLOW_M_S is in rad/s where the table turns.
 SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
@@ -176,6 +177,7 @@ def _pack_modes(own: Chain, chain: Chain, number: int | None, period_s: float, s
     given = chain.damping_n_m_s_rad
     damping = modal_damping if given is None else modes.shape.T @ given @ modes.shape
     shapes = _pack_shapes(own, chain, modes, damping)
+    shapes = shapes._replace(motor_impulse=_shown(shapes.motor_impulse, shapes.motor, modes.frequency_rad_s * period_s))
     motor, table = shapes.motor, shapes.table
     gains = [
         (float(each), float(motor * step.b2 @ motor), float(motor * step.b2 @ table), float(table * step.b2 @ table))
@@ -190,6 +192,15 @@ def _pack_modes(own: Chain, chain: Chain, number: int | None, period_s: float, s
         coarse=gains[0],
         fine=gains[1],
     )
+
+
+def _shown(impulse: FloatArray, place: FloatArray, angle_rad: FloatArray) -> FloatArray:
+    """An impulse without the modes (n,) that turn by more than half a turn per tick, with the same shift of a place.
+
+    Ticks cannot show such a mode: corrections at each tick would excite its alias.
+    """
+    shown = impulse / (1.0 + (angle_rad / np.pi) ** _STEEP)
+    return shown * ((place @ impulse) / (place @ shown))
 
 
 def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) -> Shapes:

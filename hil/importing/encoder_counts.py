@@ -85,6 +85,15 @@ def counts_ratio(ratio: float) -> float:
     return usual if usual and abs(ratio / usual - 1.0) < _FRACTION else ratio
 
 
+def angle_count(size: float, unit: str) -> float:
+    """Size of a count of an angle encoder by a measured one in `unit`: usual counts per turn, or a number of two digits
+    for the size or for the counts per turn, if one is near; else the measured one."""
+    turn = 2.0 * pi / UNITS[unit][1]
+    round_ones = (float(f"{size:.1e}"), turn / float(f"{turn / size:.1e}"), *(turn / counts for counts in COUNTS))
+    near = [one for one in round_ones if abs(size / one - 1.0) < _FRACTION]
+    return min(near, key=lambda one: abs(size / one - 1.0), default=float(f"{size:.6g}"))
+
+
 def angle_unit(column: str, values: FloatArray, speeds: list[tuple[str, float]]) -> UnitChoice | None:
     """Unit of an angle (n,) that has none, by its speeds or by whole counts per turn; None if neither tells it.
 

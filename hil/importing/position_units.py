@@ -5,7 +5,7 @@ from math import pi
 from hil.arrays import FloatArray
 from hil.identification.derivatives import MeasuredMotion, motion
 from hil.importing.column_names import Label, effort_of_words
-from hil.importing.encoder_counts import angle_unit
+from hil.importing.encoder_counts import angle_count, angle_unit
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.listed_names import NAMELESS
 from hil.importing.map_draft import MapDraft
@@ -145,7 +145,7 @@ class PositionUnits:
         if command is None or told not in UNITS or UNITS[told][0] != "rad" or command in self.asked:
             return {}
         relation = proportional(self.live[command], self.live[name])
-        size = float(f"{abs(relation.factor):.6g}")
+        size = angle_count(abs(relation.factor), told)
         if relation.share <= SAME_POSITION:
             return {}
         self.draft.unsure.append(f"{name}: counts of {size:g} {told} are taken, by the set-point {command}")

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from hil.channels import AXIS_CHANNELS, AxisKind
 from hil.importing.by_map import import_recording
+from hil.importing.encoder_counts import angle_count
 from hil.importing.motor_set_points import gear_of_set_points
 
 NAMES = AXIS_CHANNELS[AxisKind.ROTARY]
@@ -73,3 +74,12 @@ def test_counts_of_a_drive(tmp_path: Path) -> None:
     assert "gear ratio 36 " in recording.metadata["clock_notes"][0]
     factor = recording.metadata["channels"]["position_command_m"]["factor"]
     assert factor == pytest.approx(2.0 * np.pi / counts["motor"] / gear)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "taken"),
+    [(0.00500006, "deg", 0.005), (0.00034332302, "deg", 360.0 / 2**20), (0.0050123, "deg", 0.0050123)],
+)
+def test_the_count_of_an_angle_is_a_round_one_if_one_is_near(size: float, unit: str, taken: float) -> None:
+    """A set-point tells it as well as the axis follows: an error of the count would be one of the transmission."""
+    assert angle_count(size, unit) == pytest.approx(taken, rel=1e-9)

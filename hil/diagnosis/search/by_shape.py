@@ -111,9 +111,10 @@ def _scaled(base: Fit, term: Term) -> Term | None:
     seen = sizes([base.hypothesis.with_term(one) for one in spanning(term)], base)
     if not seen:
         return None
-    # noise in a shape makes its size too small: of the ways that tell it the one with the largest
-    clear = [own for own in seen if _least(own) < math.log(CRITERIA.significance)]
-    way = max(clear, key=_largest) if clear else min(seen, key=_least)
+    # noise in a shape makes its size too small: of the ways that tell it in its channel the one with the largest
+    way = min(seen, key=_least)
+    clear = [own for own in seen if own[0].channel == way[0].channel and _least(own) < math.log(CRITERIA.significance)]
+    way = max(clear, key=_largest, default=way)
     told = combined(term, [one.told.value for one in way])
     values, parameters = list(told.values), BY_ID[term.effect].parameters
     for strength, *_ in pairs(term):

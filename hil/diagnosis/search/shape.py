@@ -79,7 +79,7 @@ def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
     """`log_chance_of_shape` of one form of a term."""
     searched, best = _searched(found) - _searched(without.hypothesis), 0.0
     seen = sizes([found], without, not fitted)
-    for (size, ratio, free), energy, rows in (one for each in seen for one in each):
+    for _, (size, ratio, free), energy, rows in (one for each in seen for one in each):
         if free > 0.0 and energy > 1.0:
             if fitted:
                 removes = max(2.0 * size - 1.0, 0.0) / size**2
@@ -93,8 +93,10 @@ def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
 
 
 class Size(NamedTuple):
-    """Size of a term in what a fit leaves, 1 at its own values; its energy over the least that counts; rows."""
+    """Size of a term in what a fit leaves of a channel, 1 at its own values; its energy over the least that counts;
+    rows."""
 
+    channel: str
     told: Coefficient
     energy: float
     rows: int
@@ -130,6 +132,7 @@ def sizes(found: Sequence[Hypothesis], without: Fit, fast: bool = True) -> list[
             every.append(
                 [
                     Size(
+                        of.channel,
                         one._replace(value=one.value * share),
                         one.value**2 * float(np.mean(shape**2)) / max(of.least, 1e-300),
                         shape.size,

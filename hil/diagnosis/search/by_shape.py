@@ -111,17 +111,21 @@ def _scaled(base: Fit, term: Term) -> Term | None:
     seen = sizes([base.hypothesis.with_term(one) for one in spanning(term)], base)
     if not seen:
         return None
-    # noise in a shape makes its size too small: of the ways that tell it in its channel the one with the largest
-    way = min(seen, key=_least)
-    clear = [own for own in seen if own[0].channel == way[0].channel and _least(own) < math.log(CRITERIA.significance)]
-    way = max(clear, key=_largest, default=way)
-    told = combined(term, [one.told.value for one in way])
+    told = combined(term, [one.told.value for one in _telling(seen)])
     values, parameters = list(told.values), BY_ID[term.effect].parameters
     for strength, *_ in pairs(term):
         if not values[strength] >= parameters[strength].low:
             return None
         values[strength] = min(values[strength], parameters[strength].high)
     return replace(told, values=tuple(values))
+
+
+def _telling(seen: Sequence[Sequence[Size]]) -> Sequence[Size]:
+    """Sizes of the channel that tells them, the largest: noise in a shape makes its size too small."""
+    clearest = min(seen, key=_least)
+    alike = [own for own in seen if own[0].channel == clearest[0].channel]
+    clear = [own for own in alike if _least(own) < math.log(CRITERIA.significance)]
+    return max(clear, key=_largest, default=clearest)
 
 
 def _largest(own: Sequence[Size]) -> float:

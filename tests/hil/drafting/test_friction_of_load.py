@@ -38,8 +38,15 @@ def shares(bench: Bench) -> tuple[float, float]:
     return coulomb, coulomb + more * ((1.0 - coulomb) if more > 0.0 else coulomb)
 
 
-def test_the_owner_s_load_is_held_and_splits_the_sum(tmp_path: Path, recorded: dict[str, np.ndarray]) -> None:
-    bench = drafted(tmp_path, recorded, OWNER)
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory, recorded: dict[str, np.ndarray]) -> tuple[Path, Bench]:
+    """Folder of the recording, and the bench that is drafted with the owner's words."""
+    folder = tmp_path_factory.mktemp("told")
+    return folder, drafted(folder, recorded, OWNER)
+
+
+def test_the_owner_s_load_is_held_and_splits_the_sum(told: tuple[Path, Bench]) -> None:
+    bench = told[1]
     axis = bench.axis
     assert axis.held == ("table_mass_kg",)
     assert axis.table_mass_kg == pytest.approx(14.3)  # type: ignore[union-attr]
@@ -55,11 +62,9 @@ def test_without_the_owner_the_split_is_half(tmp_path: Path, recorded: dict[str,
     assert bench.axis.table_mass_kg == bench.axis.motor_mass_kg  # type: ignore[union-attr]
 
 
-def test_the_second_encoder_tells_spring_and_friction_behind_the_motor(
-    tmp_path: Path, recorded: dict[str, np.ndarray]
-) -> None:
-    bench = drafted(tmp_path, recorded, OWNER)
-    fit = fit_nominal_parameters(prepare([read_recording(tmp_path / "log.parquet")], [], bench).train, 30)
+def test_the_second_encoder_tells_spring_and_friction_behind_the_motor(told: tuple[Path, Bench]) -> None:
+    folder, bench = told
+    fit = fit_nominal_parameters(prepare([read_recording(folder / "log.parquet")], [], bench).train, 30)
     axis = fit.bench.axis
     assert axis.stiffness_n_m / axis.table_mass_kg == pytest.approx(6e5 / 14.0, rel=0.05)  # type: ignore[union-attr]
     assert shares(fit.bench)[0] == pytest.approx(18.0 / 24.0, abs=0.05)

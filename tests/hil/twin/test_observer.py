@@ -66,3 +66,22 @@ def test_a_torque_that_is_wrong_is_no_error_of_the_table(period_s: float) -> Non
     seen = [float(np.median(stretch[rows])) for rows in (away, back)]
     # beside the motor as it is before the observer puts it back, the table would differ by half the motor's error
     assert abs(seen[0] - seen[1]) < 0.1 * abs(errors[0] - errors[1])
+
+
+@pytest.mark.parametrize("turns", [0.25, 0.7, 1.0, 3.0])
+def test_a_mode_that_the_ticks_do_not_show_is_not_excited(turns: float) -> None:
+    """Of a spring whose mode turns as often as ticks pass, a wrong friction moves the motor as on a rigid axis."""
+    bench, period_s = load_bench("reference"), 0.01
+    own = bench.twin().modal.frequency_rad_s[1]
+    stiffness = bench.axis.stiffness_n_m * (2.0 * np.pi * turns / period_s / own) ** 2  # type: ignore[union-attr]
+    physics = bench.axis.model_copy(update={"stiffness_n_m": stiffness, "damping_ratio": 0.03}).physics()
+    twin = Twin(physics, bench.gains._replace(period_s=period_s), observer_s=LEAST_TICKS * period_s)
+    time_s = np.arange(400) * period_s
+    torque = 3.0 * physics.coulomb_n_m * np.sign(np.sin(2.0 * np.pi * 0.5 * time_s)) * (time_s % 1.0 < 0.6)
+    true = twin.drive(torque)
+    less = replace(twin, physics=replace(physics, coulomb_n_m=0.8 * physics.coulomb_n_m))
+    found = less.observe(np.zeros(time_s.size), np.zeros(time_s.size), Response(*true[:2], torque, torque))
+    inertia = float(twin.modal.shape[twin.modal.motor, 0] ** -2)
+    rigid = 0.2 * physics.coulomb_n_m * twin.observer_s**2 / inertia
+    error = np.abs(true.motor_position - found.motor_position)
+    assert np.max(error) < 2.0 * rigid

@@ -15,7 +15,7 @@ from hil.importing.lexicon import Constant, Quantity
 from hil.importing.map_draft import Asked, DraftedChannel, MapDraft, ask_column
 from hil.importing.map_file import ChannelSource
 from hil.importing.position_units import PositionUnits, effort_si
-from hil.importing.questions import counts_like, effort_unit, position_unit, speed_unit
+from hil.importing.questions import counts_like, counts_of_scale, effort_unit, position_unit, speed_unit
 from hil.importing.relations import SAME_POSITION, derivative_of, driven, lateness_s, proportional
 from hil.importing.roles import Roles, may_be_asked
 from hil.importing.speed_unit import speed_entry
@@ -202,11 +202,12 @@ class ChannelEntries:
         same = abs(abs(factor) - 1.0) < SAME_COUNTS
         if unit == "counts" and self.unsized:  # its counts are told when those of the encoder are
             ratio = 1.0 if same else counts_ratio(abs(factor))
-            sizes, told = {key: size * ratio for key, size in self.unsized.items()}, self.draft.table.constants
-            if channel == "table_position_m" and self.draft.lead_m and Constant.LEAD in told:
-                sizes = {"counts_per_m": max(sizes.values()) / self.draft.lead_m}
+            sizes = {key: size * ratio for key, size in self.unsized.items()}
+            question = counts_like(encoder, channel, None if same else ratio)
+            scale = channel == "table_position_m" and Constant.LEAD in self.draft.table.constants
+            if scale and self.draft.lead_m and (per_rev := sizes.get("counts_per_rev")):
+                sizes, question = {"counts_per_m": per_rev / self.draft.lead_m}, counts_of_scale()
             keys |= sizes
-            question = counts_like(encoder, channel, None if same else ratio, not set(sizes) <= set(self.unsized))
             self.draft.asked += [Asked(channel, key, f"{name}: is in counts; {question}") for key in sizes]
         elif unit == "counts" and channel == "table_position_m" and (count := self.positions.count_by_command(name)):
             keys |= count

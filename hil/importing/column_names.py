@@ -22,7 +22,9 @@ _MOTION = (Quantity.POSITION, Quantity.VELOCITY, Quantity.ACCELERATION)
 _BRACKET = re.compile(r"[\[({].*[\])}]")
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+(:\d+)?")
 _OBJECT = re.compile(r"(?<![0-9a-zA-Z])(?:0x)?(6[0-9a-fA-F]{3})h?(?![0-9a-zA-Z])")
-_IDENT = re.compile(r"(?<![0-9a-zA-Z])(S-0-\d{4})(?![0-9])", re.IGNORECASE)
+_ADDRESS_OF_DRIVE = re.compile(
+    r"\b0x(6[0-9a-f]{3})(?![0-9a-z])|(?<![0-9a-z])(6[0-9a-f]{3})h\b|(?<![0-9a-z])(s-0-\d{4})(?!\d)", re.IGNORECASE
+)
 _INDEX = re.compile(r"[\[({]\s*(?:\w+\s*[,;:]\s*)?(\d+)\s*[\])}]\s*$")  # [2], (2), [u1, 2]
 _LINEAR_AXES, _AXES = "xyz", "xyzabcuvw"  # ISO 841
 LEAST_WITHIN = 4  # letters of a word that is also found within a longer one: shorter ones occur in others by chance
@@ -58,7 +60,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
 
     The unit of the name counts first, but for one of the cells themselves.
     """
-    words_beside = f"{words_beside} {_words_of_address(f'{column} {words_beside}')}".strip()
+    words_beside = f"{words_beside} {_words_of_address(column) or _words_of_address(words_beside)}".strip()
     name, unit, odd = split_unit(column.strip())
     if unit is None and not odd:
         name, unit = _unit_after_blank(name)
@@ -124,9 +126,10 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
 
 
 def _words_of_address(name: str) -> str:
-    """What the value is whose address in a drive is in a name, 0x6064 or S-0-0051; "" without one."""
-    address = _OBJECT.search(name) or _IDENT.search(name)
-    return lexicon().addresses.get(address[1].lower(), "") if address else ""
+    """What the value is whose address in a drive a name holds, 0x6064 or S-0-0051, or is, 6064; "" without one."""
+    address = _ADDRESS_OF_DRIVE.search(name) or _OBJECT.fullmatch(name.strip())
+    found = next((one for one in address.groups() if one), "") if address else ""
+    return lexicon().addresses.get(found.lower(), "")
 
 
 def _unit_of_object(name: str) -> str | None:

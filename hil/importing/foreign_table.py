@@ -19,7 +19,7 @@ from hil.importing.foreign_columns import as_measured, check_foreign, format_of,
 from hil.importing.header_rows import read_factor
 from hil.importing.header_values import HeaderValue, header_text
 from hil.importing.lexicon import Constant
-from hil.importing.listed_scales import listed_scales, value_and_unit
+from hil.importing.listed_scales import is_raw, listed_scales, value_and_unit
 from hil.importing.map_file import SECONDS, CsvOptions
 from hil.importing.records import read_records
 from hil.importing.row_groups import moving_group
@@ -157,14 +157,6 @@ def _text(path: Path) -> ForeignTable:
         lines=rows.lines,
         cell_units=rows.units,
     )
-
-
-def is_raw(values: FloatArray, factor: float, offset: float) -> bool:
-    """True if a factor of the header is still to be applied to a column (n,): to whole numbers, as a drive has them."""
-    given = values[np.isfinite(values)]
-    whole = bool(np.all(given == np.round(given)))
-    multiples = factor > 1.0 and bool(np.all(given % factor == 0.0)) and bool(given.any())
-    return (factor == 1.0 and offset != 0.0) or (factor != 1.0 and whole and not multiples)
 
 
 def _counted_period(lines: Sequence[str], rows: int) -> dict[Constant, HeaderValue]:

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from math import isfinite
 
+import numpy as np
+
+from hil.arrays import FloatArray
 from hil.importing.lexicon import RowKind, lexicon
 from hil.importing.units import unit_named
 
@@ -105,6 +108,19 @@ def listed_scales(lines: Sequence[str], names: Sequence[str]) -> ListedScales:
         if (factor, offset) != (1.0, 0.0):
             found.scales[name] = factor, offset
     return found
+
+
+def is_raw(values: FloatArray, factor: float, offset: float) -> bool:
+    """True if a factor of the header is still to be applied to a column (n,): to whole numbers, as a drive has them."""
+    given, whole = values[np.isfinite(values)], is_whole(values)
+    multiples = factor > 1.0 and bool(np.all(given % factor == 0.0)) and bool(given.any())
+    return (factor == 1.0 and offset != 0.0) or (factor != 1.0 and whole and not multiples)
+
+
+def is_whole(values: FloatArray) -> bool:
+    """True for a column (n,) of whole numbers."""
+    given = values[np.isfinite(values)]
+    return bool(np.all(given == np.round(given)))
 
 
 @cache

@@ -145,9 +145,9 @@ class PositionUnits:
         if command is None or told not in UNITS or UNITS[told][0] != "rad" or command in self.asked:
             return {}
         relation = proportional(self.live[command], self.live[name])
-        size = angle_count(abs(relation.factor), told)
         if relation.share <= SAME_POSITION:
             return {}
+        size = angle_count(abs(relation.factor), told)
         self.draft.unsure.append(f"{name}: counts of {size:g} {told} are taken, by the set-point {command}")
         return {"unit": told, "scale": size}
 

@@ -46,20 +46,19 @@ def effort_unit(kind: AxisKind) -> str:
     )
 
 
-def counts_like(encoder: str, channel: str, ratio: float | None, per_m: bool) -> str:
-    """Question for the counts of a channel beside those of `encoder`, by its counts over them; None: the same.
+def counts_of_scale() -> str:
+    """Question for the counts of a second encoder on an axis whose lead is known."""
+    return "write the counts per metre of the scale; of an encoder that turns counts_per_rev, and remove lead_m"
 
-    `per_m`: of a linear scale on an axis whose lead is known.
-    """
-    if per_m:
-        return "write the counts per metre of the scale"
+
+def counts_like(encoder: str, channel: str, ratio: float | None) -> str:
+    """Question for the counts of a channel beside those of `encoder`, by its counts over them; None: the same."""
     size = f"the same as for {encoder}" if ratio is None else f"{ratio:.6g} times that of {encoder}"
     if channel == "table_position_m":
         far = "" if ratio is None else "those per revolution of the load; on the motor's shaft "
         return f"write {far}{size}; of a linear scale counts_per_m, and lead_m above the line 'channels:'"
-    return f"write {size}" + (
-        "; behind a gear times its ratio" if channel == "position_command_m" and not ratio else ""
-    )
+    gear = "; behind a gear times its ratio" if channel == "position_command_m" and ratio is None else ""
+    return f"write {size}{gear}"
 
 
 def missing_column(what: str, columns: Iterable[str], channel: str) -> str:

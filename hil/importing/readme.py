@@ -6,11 +6,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from hil.files.input_file import check_file
+from hil.importing.column_names import label
 from hil.importing.encodings import encoding_of
-from hil.importing.foreign_table import ForeignTable, is_raw
+from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import header_values
+from hil.importing.lexicon import Quantity
+from hil.importing.listed_scales import is_raw, is_whole
 from hil.importing.readme_columns import ToldColumn, told_columns
 from hil.importing.unit_lines import described
+from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
 _LONGEST = 1_000_000  # bytes: no README is as long
 
@@ -48,13 +52,23 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     titles = {table.titles.get(name, name): name for name in table.columns}
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
-    steps = {name: one.step for name, one in told.items() if one.step != 1.0 and name not in table.units}
-    scales = {name: (step, 0.0) for name, step in steps.items() if is_raw(table.columns[name], step, 0.0)}
-    units = {name: one.unit for name, one in told.items() if one.unit and (name in scales or name not in steps)}
+    told = {name: one for name, one in told.items() if _fits(table, name, one)}
+    steps = {name: one.step for name, one in told.items() if one.step and name not in table.units}
     return replace(
         table,
-        units=units | table.units,
-        scales=scales | table.scales,
+        units={name: one.unit for name, one in told.items() if one.unit} | table.units,
+        scales={name: (step, 0.0) for name, step in steps.items()} | table.scales,
         words={name: one.words for name, one in told.items() if one.words} | table.words,
         constants=header_values(lines, {}) | table.constants,
     )
+
+
+def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
+    """True if a column may be what a README tells: of the quantity of its words, and whole numbers of its counts."""
+    said = label(table.titles.get(name, name), "", told.words).quantity
+    of_unit = QUANTITY_OF_UNIT.get(unit_named(told.unit) or "")
+    if of_unit is not None and said not in (Quantity.UNKNOWN, Quantity.OTHER, of_unit):
+        return False
+    if told.step is None:
+        return True
+    return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

@@ -1,8 +1,9 @@
 """What a README says of the columns of a file: words, unit, and the size of one count.
 
-A list has a line for each, "q_mot   motor encoder, degrees of the motor", "- force [N], measured", "3. scale [counts],
-0.2 um each". A name that is no word, with a digit or an underscore, may stand anywhere in a line: "S-0-0047 position
-command, S-0-0051 position feedback, both 0.0001 mm". What stands behind a name, up to the next one, is said of it.
+A list has a line for each, "q_mot   motor encoder, degrees of the motor", "- force [N], measured"; of a file without a
+header by number, "3. scale [counts], 0.2 um each". A name that is no word, with a digit or an underscore, may stand
+anywhere in a line: "S-0-0047 position command, S-0-0051 position feedback, both 0.0001 mm". What stands behind a name,
+up to the next one, is said of it.
 """
 
 import re
@@ -14,78 +15,115 @@ from hil.importing.units import factor_and_unit, unit_named
 
 _WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
 _BEHIND_NAME = r"(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|\t\s*|\s*(?=[\[(]))"
-_BEHIND_NUMBER = r"(?:[.):]\s*|\s+)"
+_NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)(.*)")
 _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)")
+_SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
+_EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
+_OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
+_PER_TURN = re.compile(r"\d+\s+(\w+)(?: ?/ ?| per | pro | je | par )")  # 65536 counts per turn
+_NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
 _FEWEST = 3  # columns that a sentence lists: fewer are words
 
 
 class ToldColumn(NamedTuple):
-    """Words and unit of a column, "" without; one of its whole numbers is `step` units."""
+    """Words and unit of a column, "" without; a count is `step` units, where one is told."""
 
     words: str
     unit: str
-    step: float = 1.0
+    step: float | None = None
 
 
 def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldColumn]:
-    """What `lines` say of columns with the `names`; nothing where they tell less than two units."""
-    told = dict[str, ToldColumn]()
-    for line in lines:
+    """What `lines` say of columns with the `names`; nothing where they tell fewer than two units.
+
+    A line that begins with a name goes before one in which it stands, a unit before the size of a count.
+    """
+    told, ranks = dict[str, ToldColumn](), dict[str, tuple[bool, bool]]()
+    mentions = [[(name, True, text)] for name, text in _numbered(lines, names)]
+    mentions += [_mentions(line, [one for one in names if one]) for line in lines]
+    for line in mentions:
         of_both: ToldColumn | None = None  # what the next name in the line says of this one, too
-        for name, text in reversed(_mentions(line, [one for one in names if one])):
+        for name, begins, text in reversed(line):
             one = _told(text)
             one = of_both._replace(words=one.words) if of_both and not one.unit else one
-            of_both = one if _says_both(text) else None
-            if name not in told or (one.unit and not told[name].unit):
-                told[name] = one
-    return told if sum(bool(one.unit) for one in told.values()) > 1 else _in_a_row(" ".join(lines), names)
+            of_both = of_both if _NOTHING.fullmatch(text) else _of_both(text)
+            rank = begins, one.step is None
+            if one.unit and (name not in told or rank > ranks[name]):
+                told[name], ranks[name] = one, rank
+    return told if len(told) > 1 else _in_a_row(" ".join(lines), names)
 
 
-def _mentions(line: str, names: Sequence[str]) -> list[tuple[str, str]]:
-    """Names of columns in a line, and the text behind each up to the next."""
-    places: list[tuple[int, int, str]] = []
+def _numbered(lines: Sequence[str], names: Sequence[str]) -> list[tuple[str, str]]:
+    """Names of columns of a file without a header, and the texts of the last list of them that tells most units.
+
+    A list has growing numbers; a procedure before it may be numbered, too.
+    """
+    lists, before = [list[tuple[str, str]]()], 0
+    for match in filter(None, map(_NUMBERED.match, lines)):
+        name, number = f"column {match[1]}", int(match[1])
+        lists += [[]] if number <= before else []
+        before = number
+        lists[-1] += [(name, match[2])] if name in names else []
+    units = [sum(bool(_told(text).unit) for _, text in one) for one in lists]
+    return next(one for one, many in zip(reversed(lists), reversed(units), strict=True) if many == max(units))
+
+
+def _mentions(line: str, names: Sequence[str]) -> list[tuple[str, bool, str]]:
+    """Names of columns in a line, whether it begins with them, and the text behind each up to the next."""
+    places: list[tuple[int, int, str, bool]] = []
     for name in names:
-        own, of_file = re.escape(name), re.fullmatch(r"column (\d+)", name)  # without a header
-        begin = rf"(?:[Cc]olumn )?{of_file[1]}{_BEHIND_NUMBER}" if of_file else rf"{own}{_BEHIND_NAME}"
-        match = re.match(rf"[\s*•–-]*{begin}(?=\S)", line) or re.match(rf"\s*[*•–-]\s*{own}\s+(?=\S)", line)
+        own = re.escape(name)
+        match = re.match(rf"[\s*•–-]*{own}{_BEHIND_NAME}(?=\S)", line) or re.match(rf"\s*[*•–-]\s*{own}\s+(?=\S)", line)
+        within = None
         if not match and re.search(r"[\d_]", name) and len(name) > 1:
-            match = re.search(rf"(?<![\w.-]){own}(?![\w-])", line)
-        places += [(match.start(), match.end(), name)] if match else []
+            within = re.search(rf"(?<![\w.-]){own}(?![\w-])", line)
+        places += [(one.start(), one.end(), name, one is match) for one in (match or within,) if one]
     places.sort()
-    ends = [*(start for start, _, _ in places), len(line)][1:]
-    return [(name, line[begin:end].strip(" :=-–,;\t")) for (_, begin, name), end in zip(places, ends, strict=False)]
-
-
-def _says_both(text: str) -> bool:
-    return any(re.match(rf"(?:{'|'.join(lexicon().both)})\b", phrase) for phrase in _phrases(text))
+    ends = [*(place[0] for place in places), len(line)][1:]
+    return [
+        (name, begins, line[begin:end].strip(" :=-–,;\t"))
+        for (_, begin, name, begins), end in zip(places, ends, strict=False)
+    ]
 
 
 def _phrases(text: str) -> list[str]:
     return [part.strip() for part in _PHRASES.split(text) if part.strip()]
 
 
+def _of_both(text: str) -> ToldColumn | None:
+    """What a phrase such as "both 0.0001 mm" says of the column before, too; None without one."""
+    begin = rf"(?:{'|'.join(lexicon().both)})\s+"
+    found = (_told(re.sub(begin, "", phrase)) for phrase in _phrases(text) if re.match(begin, phrase))
+    return next((one for one in found if one.unit), None)
+
+
 def _told(text: str) -> ToldColumn:
-    """Words, unit and step of what is said of a column: a unit by itself before the size of a count."""
+    """Words, unit and step of what is said of a column. A plain unit goes before the size of a count."""
     phrases = _phrases(text)
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
     words = phrases[0] if phrases and phrases[0] != unit else ""
-    if not unit or unit_named(unit) == "counts":
-        step = next((found for part in phrases if (found := _step(part))), (1.0, unit))
-        return ToldColumn(words, step[1], step[0])
-    return ToldColumn(words, unit)
+    counts = unit_named(unit) == "counts"
+    if (unit and not counts) or any(unit_named(one[1]) == "counts" for one in _PER_TURN.finditer(text)):
+        return ToldColumn(words, unit)
+    steps = (step for part in phrases if (step := _step(part, counts)))
+    return next((ToldColumn(words, of_step, size) for size, of_step in steps), ToldColumn(words, unit))
 
 
-def _step(phrase: str) -> tuple[float, str] | None:
-    """Size of a count with which a phrase begins: 0.0001 mm, 0,1 % of the rated torque, both 0.2 um each."""
-    words = re.sub(rf"^(?:{'|'.join(lexicon().both)})\s+", "", phrase).split()
-    for take in (1, 2, 3) if words and re.match(r"\d|1/", words[0]) else ():
-        size, beyond = " ".join(words[:take]), words[take : take + 1]
-        if unit_named(size) == "permille":
-            return 1.0, size
-        part = factor_and_unit(size)
-        if part and unit_named(part[1]) != "counts" and not _part_of_unit(beyond):
-            return part
-    return None
+def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:
+    """Size of a count and its unit, where a phrase is nothing else: 0.0001 mm, 0,1 % of the rated torque, 0.2 um each.
+
+    A whole number of units may be another size, unless the column is in `counts` or it is said of each.
+    """
+    match = _SIZE.match(re.sub(rf"^(?:{'|'.join(lexicon().both)})\s+", "", phrase))
+    size, rest = (match[0], match.string[match.end() :].strip()) if match else ("", "")
+    share, each = bool(_OF_RATED.fullmatch(rest)), bool(_EACH.fullmatch(rest))
+    if unit_named(size) == "permille" and (share or each):
+        return None, size
+    part = factor_and_unit(size)
+    if part is None or not part[0] > 0.0 or unit_named(part[1]) == "counts":
+        return None
+    sure = counts or bool(rest) or part[0] <= 1.0
+    return part if (each and sure) or (share and unit_named(part[1]) == "%") else None
 
 
 def _in_a_row(text: str, names: Sequence[str]) -> dict[str, ToldColumn]:

@@ -43,8 +43,7 @@ def _inputs(setpoints, k, motor, table):  # type: ignore[no-untyped-def]
 @njit(**COMPILE)
 def _correct(impulse, error, period, time_constant, delta):  # type: ignore[no-untyped-def]
     """Correct the state of one side of the transmission by the error of its position [motor units]: a Luenberger
-    observer. The side moves as one body: a motor alone would wind up its coupling. So does the whole axis with a spring
-    whose mode is faster than the ticks, by which it would be excited (`hil.twin.stepping.records`)."""
+    observer. The side moves as one body: a motor alone would wind up its coupling."""
     shift = 2.0 * period / time_constant * error
     kick = period / time_constant**2 * error
     for i in range(delta.shape[1]):
@@ -123,9 +122,10 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
 
     The controller gets the measured positions, the drive the measured command, the axis that torque, and the
     transmission the measured motor: the twin's motor is corrected by it after each prediction, its table only while
-    it floats in a gap or rests. So a mismatch shows in its own block, at its own place and time, and is then
-    forgotten. `resting` (n,) marks the rows at which the motor rests. The measured table is empty without a linear
-    encoder. Its datum is the mean difference from the twin while the axis moves. `push` as in `closed_loop`.
+    it floats in a gap or rests. A table behind a spring that is stiff for the ticks moves with the motor. So a mismatch
+    shows in its own block, at its own place and time, and is then forgotten. `resting` (n,) marks the rows at which the
+    motor rests. The measured table is empty without a linear encoder. Its datum is the mean difference from the twin
+    while the axis moves. `push` as in `closed_loop`.
     """
     constants, modes, values, codes, delta, memory = axis
     c, own, shapes = constants[0], memory[0], shapes_of(modes)
@@ -138,15 +138,16 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
     motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
     datum, settled, moved = 0.0, 0, 0
-    # share of a shift of the motor by which the table moves with it, 1 where the motor alone holds it
-    carried = along(shapes.table, shapes.motor_impulse)
     hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
         inputs = _inputs(setpoints, k, measured_motor[k], seen[k])
         state, wanted[k] = _follow(gains, state, inputs, command[k], c.period)
         error = measured_motor[k] - motor[k]
-        _correct(shapes.motor_impulse, error, c.period, c.observer, delta)
+        # within a gap the motor moves alone
+        impulse = shapes.motor_impulse if own.floating > 0.0 else shapes.held_impulse
+        carried = along(shapes.table, impulse)  # share of the motor's shift that moves the table, too
+        _correct(impulse, error, c.period, c.observer, delta)
         own_table = table[k]
         # it follows the mean of a motor that is put back by 2 T / time constant x error at each tick
         table[k] -= (1.0 - carried) * c.ratio * c.period / c.observer * error

@@ -1,6 +1,6 @@
 """Records that the compiled kernels work on, and their packing from a twin.
 
-`constants`, `codes` and `memory` are arrays of one record; `modes` (20 + n, n) has a row for each quantity of the n
+`constants`, `codes` and `memory` are arrays of one record; `modes` (21 + n, n) has a row for each quantity of the n
 modes, read through `shapes_of`, `step_of` and `coupling_of`; `values` (slots, PARAMETERS) holds the parameters of the
 mechanisms.
 """
@@ -24,7 +24,7 @@ from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import Discrete, Modal, discretise, lowest_modes
 
 _ROUNDING = 1e-12  # of all damping: below, a whole axis as one side has only rounding of it
-_STEEP = 8  # a mode of a quarter turn per tick loses half a per cent, one of a whole turn all but that
+_STEEP = 8  # exponent: 0.4 % of a mode of a quarter turn per tick are left out, 99.6 % of one of a whole turn
 # The step is fine while motor or table moves slower than this, or could reverse within two ticks; the axis then rests
 # for the observer of its table. Alike for a lead of 10 mm; SLOW_M_S is in rad/s where the table turns.
 SLOW_RAD_S, SLOW_M_S = 0.02, 32e-6
@@ -92,6 +92,7 @@ class Shapes(NamedTuple):
     table_side: FloatArray  # momentum of the table side of the transmission, all that mechanisms added included
     table_impulse: FloatArray  # momentum of the table side of the nominal chain
     motor_impulse: FloatArray  # and of its motor side
+    held_impulse: FloatArray  # of its motor side and of what moves with it as one body
 
 
 @njit(inline="always")
@@ -104,13 +105,13 @@ def step_of(modes, fine):  # type: ignore[no-untyped-def]
 @njit(inline="always")
 def shapes_of(modes):  # type: ignore[no-untyped-def]
     """Shares of the modes in displacements and forces."""
-    return Shapes(modes[12], modes[13], modes[14], modes[15], modes[16], modes[17], modes[18], modes[19])
+    return Shapes(modes[12], modes[13], modes[14], modes[15], modes[16], modes[17], modes[18], modes[19], modes[20])
 
 
 @njit(inline="always")
 def coupling_of(modes):  # type: ignore[no-untyped-def]
     """Damping that modes share (n, n)."""
-    return modes[20:]
+    return modes[21:]
 
 
 def start_memory() -> NDArray[np.void]:
@@ -155,7 +156,7 @@ def pack(
 
 
 class _PackedModes(NamedTuple):
-    """Modes as the kernels take them: `rows` (20 + n, n), and what a mechanism or a step does to them.
+    """Modes as the kernels take them: `rows` (21 + n, n), and what a mechanism or a step does to them.
 
     `damper` is the damping against the sides of the transmission moving apart, `springs` the number of elastic modes
     that deflect it; `coarse` and `fine` are records of a step.
@@ -177,7 +178,8 @@ def _pack_modes(own: Chain, chain: Chain, number: int | None, period_s: float, s
     given = chain.damping_n_m_s_rad
     damping = modal_damping if given is None else modes.shape.T @ given @ modes.shape
     shapes = _pack_shapes(own, chain, modes, damping)
-    shapes = shapes._replace(motor_impulse=_shown(shapes.motor_impulse, shapes.motor, modes.frequency_rad_s * period_s))
+    held = _shown(shapes.motor_impulse, shapes.motor, modes.frequency_rad_s * period_s)
+    shapes = shapes._replace(held_impulse=held)
     motor, table = shapes.motor, shapes.table
     gains = [
         (float(each), float(motor * step.b2 @ motor), float(motor * step.b2 @ table), float(table * step.b2 @ table))
@@ -195,9 +197,9 @@ def _pack_modes(own: Chain, chain: Chain, number: int | None, period_s: float, s
 
 
 def _shown(impulse: FloatArray, place: FloatArray, angle_rad: FloatArray) -> FloatArray:
-    """An impulse without the modes (n,) that turn by more than half a turn per tick, with the same shift of a place.
+    """An impulse (n,) with little of each mode that turns by more than half a turn per tick, and its shift of a place.
 
-    Ticks cannot show such a mode: corrections at each tick would excite its alias.
+    Ticks do not show such a mode (Nyquist): corrections at each tick would excite its alias.
     """
     shown = impulse / (1.0 + (angle_rad / np.pi) ** _STEEP)
     return shown * ((place @ impulse) / (place @ shown))
@@ -213,7 +215,7 @@ def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) ->
     some = resisting @ table_side > _ROUNDING * np.trace(damping) * np.sum(table_side**2)
     damper = -resisting if some else np.zeros(resisting.size)
     at_motor, at_table = modes.shape[modes.motor], modes.shape[modes.table]
-    return Shapes(at_motor, at_table, modes.transmission, modes.screw, damper, table_side, table, motor)
+    return Shapes(at_motor, at_table, modes.transmission, modes.screw, damper, table_side, table, motor, motor)
 
 
 def _pack_mechanisms(active: Sequence[Active]) -> tuple[FloatArray, NDArray[np.void]]:

@@ -11,7 +11,9 @@ from foreign_axis import axis, write
 from hil.commands.import_ import import_
 from hil.errors import InputError
 from hil.explanation import explain
+from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
+from hil.importing.lexicon import Quantity
 from hil.importing.readme import FileHints
 from hil.importing.readme_columns import told_columns
 from hil.recording.recording import read_recording
@@ -180,13 +182,12 @@ def test_a_list_has_units_in_brackets_and_sizes_of_counts() -> None:
     names = ["lage_soll", "motormoment", "coppia_permille", "S-0-0047", "S-0-0051", "S-0-0040", "mot_inc"]
     told = {name: (unit, step) for name, (_, unit, step) in told_columns(lines, names).items()}
     assert told == {
-        "lage_soll": ("mm", 1.0),
-        "motormoment": ("Nm", 1.0),
-        "coppia_permille": ("0,1 %", 1.0),
+        "lage_soll": ("mm", None),
+        "motormoment": ("Nm", None),
+        "coppia_permille": ("0,1 %", None),
         "S-0-0047": ("mm", 1e-4),
         "S-0-0051": ("mm", 1e-4),
         "S-0-0040": ("rpm", 1e-4),
-        "mot_inc": ("", 1.0),
     }
 
 
@@ -205,13 +206,13 @@ def test_columns_without_a_header_stand_in_a_numbered_list() -> None:
 
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "um"), (0.001, None)])
 def test_a_step_is_that_of_whole_numbers(scale: float, unit: str | None, tmp_path: Path) -> None:
-    """An encoder of 5 um steps whose column is not counted in them has the unit of its column."""
+    """An encoder of 0.5 um whose column is not counted in it has the unit of its column."""
     counts = np.round(2e3 * AXIS["angle"])
     columns = {"t": AXIS["t"], "pos_1": scale * counts, "M": AXIS["torque"]}
     source, readme = write(tmp_path / "log.parquet", columns), tmp_path / "notes.txt"
-    readme.write_text("- pos_1 scale of the slide, 5 um steps\n- M force [N]\n- t time [s]\n")
+    readme.write_text("- pos_1 scale of the slide, 0.5 um per count\n- M force [N]\n- t time [s]\n")
     entry = next(one.entry for one in draft_map(source, readme=readme).channels if one.entry["column"] == "pos_1")
-    assert (entry.get("scale"), entry["unit"]) == ((5.0, unit) if unit else (None, entry["unit"]))
+    assert (entry.get("scale"), entry["unit"]) == ((0.5, unit) if unit else (None, entry["unit"]))
 
 
 def test_counts_of_two_encoders_beside_a_lead_make_a_map_that_is_read(tmp_path: Path) -> None:
@@ -221,3 +222,62 @@ def test_counts_of_two_encoders_beside_a_lead_make_a_map_that_is_read(tmp_path: 
     draft = draft_map(source, readme=readme)
     assert (draft.lead_m, {one.key for one in draft.asked}) == (0.005, {"counts_per_rev", "counts_per_m", "unit"})
     assert explain(source, tmp_path / "explained", readme=readme).basis.unsized
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "motor encoder [counts], 65536 per rev, 10 mm lead",
+        "motor encoder, 0 deg at the end stop, 65536 counts per turn",
+        "motor encoder [inc], 2 ms late, 65536 inc/rev",
+        "motor encoder counts, 65536 per turn, 24 V supply",
+        "position [counts], 300 mm travel",
+        "motor encoder, 10 mm belt",
+        "linear scale, 20 um grating period",
+        "linear scale, 5 um",
+    ],
+)
+def test_another_size_beside_a_column_is_not_that_of_its_counts(said: str) -> None:
+    told = told_columns([f"- x_1: {said}", "- t: time [s]", "- M: torque [Nm]"], ["x_1", "t", "M"])
+    unit = (
+        "counts" if "[counts]" in said else "inc" if "[inc]" in said else "counts" if "encoder counts" in said else ""
+    )
+    assert told.get("x_1", told_columns([], [])) == (told["x_1"]._replace(unit=unit, step=None) if unit else {})
+
+
+@pytest.mark.parametrize(
+    ("line", "data", "unit"),
+    [
+        ("x_1: scale, 1 um", "decimals", "deg"),  # by its steps
+        ("x_1 motor angle, M_1 torque Nm, both at the motor shaft", "decimals", "deg"),
+        ("x_1: motor angle, each 1 A", "whole", None),
+        ("x_1: scale, 1 um", "whole", "um"),
+    ],
+)
+def test_what_cannot_be_of_a_column_is_not_taken(line: str, data: str, unit: str | None, tmp_path: Path) -> None:
+    values = np.degrees(AXIS["angle"]) if data == "decimals" else np.round(1e4 * AXIS["angle"])
+    columns = {"t": AXIS["t"], "x_1": values, "M_1": AXIS["torque"]}
+    source, readme = write(tmp_path / "log.parquet", columns), tmp_path / "notes.txt"
+    readme.write_text(f"- {line}\n- M_1: torque [Nm]\n- t: time [s]\n")
+    draft = draft_map(source, readme=readme)
+    entry = next(one for one in draft.channels if one.entry["column"] == "x_1")
+    asked = {one.key for one in draft.asked}
+    assert (entry.entry["unit"] == unit) if unit else (asked & {"unit", "counts_per_rev"})
+
+
+def test_a_numbered_procedure_is_no_list_of_columns() -> None:
+    lines = ["1. Wait in s", "2. Torque limit 3 [Nm]", "3. Move slowly [mm]", "2 kW servo, in Nm", "Columns"]
+    lines += ["1. time [s]", "2. table position [mm]", "3. torque [Nm]"]
+    told = told_columns(lines, [f"column {number}" for number in range(1, 4)])
+    assert [one.unit for one in told.values()] == ["s", "mm", "Nm"]
+
+
+def test_a_line_that_begins_with_a_name_goes_before_one_in_which_it_stands() -> None:
+    lines = ["Maximum speed of x_1, 0.5 m/s", "x_2 - x_1 is the lag error in um", "- x_1 position in mm", "- M: Nm"]
+    assert told_columns(lines, ["x_1", "x_2", "M"])["x_1"].unit == "mm"
+
+
+def test_a_number_is_an_address_where_nothing_else_is_said() -> None:
+    told = {"6064": Quantity.POSITION, "0x6064 act": Quantity.POSITION, "S-0-0040": Quantity.VELOCITY}
+    told |= dict.fromkeys(["SN 6062", "log_6064_3", "vibration [606C]", "S-0-9999"], Quantity.UNKNOWN)
+    assert {name: label(name).quantity for name in told} == told

@@ -35,7 +35,7 @@ from hil.identification.plain_model import PlainModel, plain_columns
 from hil.identification.residual_scales import follows, inertia
 from hil.identification.torque_left import observed
 from hil.identification.whitening import RANK, filtered, whitening_filter
-from hil.identification.windows import shortest_window
+from hil.identification.windows import quiet_window
 
 
 def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Dataset:
@@ -50,7 +50,7 @@ def noise_apart(data: Dataset, reference: Hypothesis, plain: PlainModel) -> Data
 def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainModel) -> NoiseApart:
     own, springs = measured_motion(run), bool(reference.bench.axis.SPRINGS)
     fine = follows(run, springs, data.observer_s)
-    moved = _little_noise(run, plain) if fine else None if springs else motion_of_set_points(run)
+    moved = _shortly_smoothed(run, plain) if fine else None if springs else motion_of_set_points(run)
     moved, rows = moved or own.moved, own.sliding(plain.slowest)
     taps, gain, window = np.ones(1), 1.0, 0
     needed = np.where(rows, plain.predict(moved), run.torque) if springs else plain.predict(moved)
@@ -72,9 +72,13 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     return apart._replace(gain=rms(measured["motor"][rows]) / least) if least else apart
 
 
-def _little_noise(run: Measured, plain: PlainModel) -> MeasuredMotion:
-    """The measured motion through the shortest mean that leaves the torque of its noise small beside that measured."""
-    window = shortest_window(run.motor, run.period_s, run.noise.torque / abs(plain["inertia"].value))
+def _shortly_smoothed(run: Measured, plain: PlainModel) -> MeasuredMotion:
+    """The measured motion through the shortest mean in which the torque of its noise is little beside that measured.
+
+    Below a longer one the noise of both is correlated: it would prefer less inertia.
+    """
+    inertia_of_model = max(abs(plain["inertia"].value), 1e-300)
+    window = quiet_window(run.motor, run.noise.motor, run.period_s, 0.0, run.noise.torque / inertia_of_model)
     return matched_motion(run.motor, run.period_s, min(window, measured_motion(run).window))
 
 

@@ -36,7 +36,7 @@ from hil.identification.derivatives import (
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
 from hil.identification.parallel import one_blas_thread
 from hil.identification.torque_lag import shift_of_torque
-from hil.identification.windows import little_noise, position_noise
+from hil.identification.windows import position_noise, quiet_window
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
@@ -101,7 +101,7 @@ class MotionData:
 def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judged: slice = slice(None)) -> MotionData:
     """Data of motor position and torque (n,), of the rows `judged` without half a window at both ends."""
     noise, rms = position_noise(position)
-    window = little_noise(position, rms, period_s)
+    window = quiet_window(position, rms, period_s)
     rows, half = np.zeros(position.size, dtype=bool), window // 2 + 1
     rows[judged] = True
     rows[:half] = rows[-half:] = False

@@ -1,4 +1,4 @@
-"""Windows of the derivatives of a measured motion: as short as the noise of its position leaves them."""
+"""Windows of the derivatives of a measured motion: as short as the noise of its position allows."""
 
 import numpy as np
 from scipy.special import ndtri
@@ -11,29 +11,30 @@ LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
 
 
 def noiseless_motion(position: FloatArray, period_s: float) -> MeasuredMotion:
-    """Motion (n,) of a position that no sensor measured: its mean is over a few rows, where it has no noise at all."""
+    """Motion (n,) of a position that no sensor measured: through the shortest window, a few rows."""
     return matched_motion(position, period_s, shortest_window(position, period_s))
 
 
-def shortest_window(position: FloatArray, period_s: float, most: float = np.inf) -> int:
-    """Rows of the shortest window in which the acceleration of a position (n,) has little noise.
-
-    `most`: white noise that an acceleration may have without the window, by which little is measured where it is less.
-    """
-    return little_noise(position, position_noise(position)[1], period_s, 0.0, most)
+def shortest_window(position: FloatArray, period_s: float) -> int:
+    """Rows of the shortest window in which the acceleration of a position (n,) has little noise."""
+    return quiet_window(position, position_noise(position)[1], period_s, 0.0)
 
 
-def little_noise(
-    position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S, most: float = np.inf
+def quiet_window(
+    position: FloatArray, noise: float, period_s: float, shortest_s: float = SMOOTH_S, beside: float = np.inf
 ) -> int:
-    """Rows of the shortest window that passes little noise: longer ones leave less motion between reversals."""
+    """Rows of the shortest window in which the acceleration of a position (n,) has little `noise` [its unit].
+
+    Little of the acceleration, and of a white one of the rms `beside` [unit/s^2] through the same window. Longer
+    windows leave less motion between reversals.
+    """
     window = best = max(round(shortest_s / period_s) | 1, 3)
     least = np.inf
     while least == np.inf or (window <= position.size // 4 and window * period_s <= LONGEST_S):
         inner = slice(window, -window) if position.size > 3 * window else slice(None)
         acceleration = matched_motion(position, period_s, window).acceleration[inner]
         passed, _, gain = noise_gains(period_s, window)
-        share = (noise * gain) ** 2 / max(min(float(np.var(acceleration)), (most * passed) ** 2), 1e-300)
+        share = (noise * gain) ** 2 / max(min(float(np.var(acceleration)), (beside * passed) ** 2), 1e-300)
         if share < least:
             best, least = window, share
         if share < _NOISE_SHARE:

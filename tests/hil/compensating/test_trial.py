@@ -79,6 +79,7 @@ def test_a_wrong_table_is_left_out_and_the_axis_is_no_worse(
     assert trial.section is not None
 
 
+@pytest.mark.long
 def test_a_compensation_that_the_bench_has_is_said_to_be_off(tmp_path: Path) -> None:
     trial = tried(tmp_path / "first", diagnosed())
     assert trial.section

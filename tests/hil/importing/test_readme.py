@@ -221,7 +221,9 @@ def test_counts_of_two_encoders_beside_a_lead_make_a_map_that_is_read(tmp_path: 
     readme.write_text("Ball screw, lead 5 mm\n")
     draft = draft_map(source, readme=readme)
     assert (draft.lead_m, {one.key for one in draft.asked}) == (0.005, {"counts_per_rev", "counts_per_m", "unit"})
-    assert explain(source, tmp_path / "explained", readme=readme).basis.unsized
+    entry = next(one.entry for one in draft.channels if one.channel == "table_position_m")
+    assert entry["counts_per_m"]
+    assert "counts_per_rev" not in entry  # beside a lead a map with both is refused
 
 
 @pytest.mark.parametrize(

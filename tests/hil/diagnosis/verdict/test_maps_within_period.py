@@ -15,6 +15,7 @@ from hil.twin.mechanism import Moment
 PERIOD_M, AMPLITUDE_M = 0.03, 20e-6  # of a wheel behind a gear: three turns of the motor
 
 
+@pytest.mark.long
 def test_a_wheel_behind_a_gear_that_runs_out_has_a_map(tmp_path: Path) -> None:
     columns = axis(12_000)
     way_m = LEAD_M / (2.0 * np.pi) * columns["angle"]

@@ -86,8 +86,10 @@ def counts_ratio(ratio: float) -> float:
 
 
 def angle_count(size: float, unit: str) -> float:
-    """Size of a count of an angle encoder by a measured one in `unit`: usual counts per turn, or a number of two digits
-    for the size or for the counts per turn, if one is near; else the measured one."""
+    """Size of a count of an angle encoder by a measured `size` in `unit`.
+
+    That of usual counts per turn, or a size or counts per turn of two digits, if one is near; else the measured one.
+    """
     turn = 2.0 * pi / UNITS[unit][1]
     round_ones = (float(f"{size:.1e}"), turn / float(f"{turn / size:.1e}"), *(turn / counts for counts in COUNTS))
     near = [one for one in round_ones if abs(size / one - 1.0) < _FRACTION]

@@ -29,12 +29,15 @@ _TOLD = {"N m": (Constant.TORQUE, Constant.RATED_TORQUE), "N": (Constant.FORCE, 
 
 
 def effort_si(effort: Label | None, draft: MapDraft) -> str | None:
-    """N m or N, as the effort is in by its unit or words, or by the constants of the file; None if nothing tells."""
-    if effort is None or effort.si is not None:
+    """N m or N, as the effort is in by its unit or words, or by the constants of the file; None if nothing tells.
+
+    Of a current the constant says it: that which produces torque makes the force of a linear motor.
+    """
+    if effort is None or (effort.si and effort.unit not in ("A", "mA")):
         return effort.si if effort else None
     told = {si for si, known in _TOLD.items() if set(known) & set(draft.table.constants)}
     told |= {si for name in draft.table.scalars if "constant" in name.lower() and (si := effort_of_words(name))}
-    return told.pop() if len(told) == 1 else None
+    return told.pop() if len(told) == 1 else effort.si
 
 
 class PositionUnits:

@@ -111,7 +111,7 @@ def _scaled(base: Fit, term: Term) -> Term | None:
     seen = sizes([base.hypothesis.with_term(one) for one in spanning(term)], base)
     if not seen:
         return None
-    told = combined(term, [one.told.value for one in _telling(seen)])
+    told = combined(term, [one.told.value for one in _of_clearest_channel(seen)])
     values, parameters = list(told.values), BY_ID[term.effect].parameters
     for strength, *_ in pairs(term):
         if not values[strength] >= parameters[strength].low:
@@ -120,8 +120,11 @@ def _scaled(base: Fit, term: Term) -> Term | None:
     return replace(told, values=tuple(values))
 
 
-def _telling(seen: Sequence[Sequence[Size]]) -> Sequence[Size]:
-    """Sizes of the channel that tells them, the largest: noise in a shape makes its size too small."""
+def _of_clearest_channel(seen: Sequence[Sequence[Size]]) -> Sequence[Size]:
+    """Sizes by the channel that tells them best; of the ways in which it tells them clearly the one with the largest.
+
+    Noise in a shape makes its size too small.
+    """
     clearest = min(seen, key=_least)
     alike = [own for own in seen if own[0].channel == clearest[0].channel]
     clear = [own for own in alike if _least(own) < math.log(CRITERIA.significance)]

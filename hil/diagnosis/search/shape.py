@@ -93,8 +93,7 @@ def _log_chance(found: Hypothesis, without: Fit, fitted: bool) -> float:
 
 
 class Size(NamedTuple):
-    """Size of a term in what a fit leaves of a channel, 1 at its own values; its energy over the least that counts;
-    rows."""
+    """Size of a term in a channel, 1 at its own values; its energy over the least that counts; number of rows."""
 
     channel: str
     told: Coefficient

@@ -177,9 +177,7 @@ def _pack_modes(own: Chain, chain: Chain, number: int | None, period_s: float, s
     modal_damping = np.diag(2.0 * modes.damping_ratio * modes.frequency_rad_s)
     given = chain.damping_n_m_s_rad
     damping = modal_damping if given is None else modes.shape.T @ given @ modes.shape
-    shapes = _pack_shapes(own, chain, modes, damping)
-    held = _shown(shapes.motor_impulse, shapes.motor, modes.frequency_rad_s * period_s)
-    shapes = shapes._replace(held_impulse=held)
+    shapes = _pack_shapes(own, chain, modes, damping, period_s)
     motor, table = shapes.motor, shapes.table
     gains = [
         (float(each), float(motor * step.b2 @ motor), float(motor * step.b2 @ table), float(table * step.b2 @ table))
@@ -205,7 +203,7 @@ def _shown(impulse: FloatArray, place: FloatArray, angle_rad: FloatArray) -> Flo
     return shown * ((place @ impulse) / (place @ shown))
 
 
-def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) -> Shapes:
+def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray, period_s: float) -> Shapes:
     """Shares of the modes."""
     n = len(own.names)
     table_side = chain.inertia_kg_m2 @ chain.side(chain.table) @ modes.shape
@@ -215,7 +213,8 @@ def _pack_shapes(own: Chain, chain: Chain, modes: Modal, damping: FloatArray) ->
     some = resisting @ table_side > _ROUNDING * np.trace(damping) * np.sum(table_side**2)
     damper = -resisting if some else np.zeros(resisting.size)
     at_motor, at_table = modes.shape[modes.motor], modes.shape[modes.table]
-    return Shapes(at_motor, at_table, modes.transmission, modes.screw, damper, table_side, table, motor, motor)
+    held = _shown(motor, at_motor, modes.frequency_rad_s * period_s)
+    return Shapes(at_motor, at_table, modes.transmission, modes.screw, damper, table_side, table, motor, held)
 
 
 def _pack_mechanisms(active: Sequence[Active]) -> tuple[FloatArray, NDArray[np.void]]:

@@ -283,3 +283,13 @@ def test_a_number_is_an_address_where_nothing_else_is_said() -> None:
     told = {"6064": Quantity.POSITION, "0x6064 act": Quantity.POSITION, "S-0-0040": Quantity.VELOCITY}
     told |= dict.fromkeys(["SN 6062", "log_6064_3", "vibration [606C]", "S-0-9999"], Quantity.UNKNOWN)
     assert {name: label(name).quantity for name in told} == told
+
+
+def test_a_current_with_a_force_constant_is_that_of_a_linear_motor(tmp_path: Path) -> None:
+    columns = {"t": AXIS["t"], "pos_um": np.round(1e6 * AXIS["x_act"]), "iq_A": AXIS["torque"] / CONSTANT}
+    source, readme = write(tmp_path / "log.mat", columns), tmp_path / "notes.txt"
+    readme.write_text(
+        "t   s\npos_um   scale, um\niq_A   torque-producing current, A\n\nForce constant 95 N/A (data sheet)\n"
+    )
+    entries = {one.channel: one.entry for one in draft_map(source, readme=readme).channels}
+    assert entries["force_n"]["force_constant_n_a"] == 95.0

@@ -70,7 +70,7 @@ def test_a_torque_that_is_wrong_is_no_error_of_the_table(period_s: float) -> Non
 
 @pytest.mark.parametrize("turns", [0.25, 0.7, 1.0, 3.0])
 def test_a_mode_that_the_ticks_do_not_show_is_not_excited(turns: float) -> None:
-    """Of a spring whose mode turns as often as ticks pass, a wrong friction moves the motor as on a rigid axis."""
+    """A wrong friction moves the motor about as far as on a rigid axis, however often the mode turns per tick."""
     bench, period_s = load_bench("reference"), 0.01
     own = bench.twin().modal.frequency_rad_s[1]
     stiffness = bench.axis.stiffness_n_m * (2.0 * np.pi * turns / period_s / own) ** 2  # type: ignore[union-attr]

@@ -12,7 +12,7 @@ from diagnosis_runs import bench, changed, recorded
 from hil.bench.control_section import UnknownControl
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.preparation.prepare import prepare
-from hil.diagnosis.search.by_shape import _resolved, _telling, fitted, shown
+from hil.diagnosis.search.by_shape import _of_clearest_channel, _resolved, fitted, shown
 from hil.diagnosis.search.forward_selection import over
 from hil.diagnosis.search.score_test import Candidate
 from hil.diagnosis.search.shape import Size, log_chance_below_noise, log_chance_of_shape, sizes
@@ -116,7 +116,7 @@ def test_a_smoothed_motion_tells_no_lag() -> None:
 
 
 def test_a_size_is_that_of_the_channel_that_tells_it() -> None:
-    """Of an encoder's error the torque tells nothing: a size of 87 at 2.4 errors there is none."""
+    """The torque tells nothing of an encoder's error: its size of 87, at 2.4 errors, does not count."""
     told = {"torque": [(-87.3, -2.44), (-66.0, -1.8)], "difference": [(1.02, 22.1), (1.09, 22.0)]}
     seen = [[Size(name, Coefficient(*one, 200.0), 10.0, 3000)] for name, ones in told.items() for one in ones]
-    assert _telling(seen)[0].told.value == 1.09
+    assert _of_clearest_channel(seen)[0].told.value == 1.09

@@ -28,6 +28,7 @@ from hil.importing.roles import Roles, find_roles, may_be_asked
 from hil.importing.rows import at_regular_times, complete_rows, filled_in, without_duplicates
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.unit_choice import are_counts
+from hil.importing.units import unit_named
 from hil.importing.wraps import unwrapped, wrap_range
 
 _TURNS = {360.0: "deg", 2.0 * np.pi: "rad"}  # unit of an angle by the range after which it starts again
@@ -182,7 +183,7 @@ def labels_of(table: ForeignTable) -> dict[str, Label]:
     labels = {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
     # no axis moves hundreds of metres in whole ones: enc_m is the motor's encoder
     metres = [name for name, one in labels.items() if one.unit == "m" and are_counts(table.columns[name])]
-    return labels | {name: replace(labels[name], unit=None) for name in metres if name not in units}
+    return labels | {name: replace(labels[name], unit=unit_named(units.get(name, ""))) for name in metres}
 
 
 def scaled(table: ForeignTable, name: str) -> FloatArray:

@@ -9,8 +9,8 @@ from hil.files.input_file import check_file
 from hil.importing.column_names import label
 from hil.importing.encodings import encoding_of
 from hil.importing.foreign_table import ForeignTable
-from hil.importing.header_values import header_values
-from hil.importing.lexicon import Quantity
+from hil.importing.header_values import HeaderValue, header_values
+from hil.importing.lexicon import Constant, Quantity
 from hil.importing.listed_scales import is_raw, is_whole
 from hil.importing.readme_columns import ToldColumn, told_columns
 from hil.importing.unit_lines import described
@@ -52,15 +52,29 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     titles = {table.titles.get(name, name): name for name in table.columns}
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
-    told = {name: one for name, one in told.items() if _fits(table, name, one)}
+    told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
+    if motor := _motor_of_two(told):  # each encoder has its own counts
+        constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
+        told = {name: one if name == motor else _as_angle(one) for name, one in told.items()}
     steps = {name: one.step for name, one in told.items() if one.step and name not in table.units}
     return replace(
         table,
         units={name: one.unit for name, one in told.items() if one.unit} | table.units,
         scales={name: (step, 0.0) for name, step in steps.items()} | table.scales,
         words={name: one.words for name, one in told.items() if one.words} | table.words,
-        constants=header_values(lines, {}) | table.constants,
+        constants=constants | table.constants,
     )
+
+
+def _motor_of_two(told: Mapping[str, ToldColumn]) -> str:
+    """The motor's encoder among columns of which counts per turn are told; "" where there are no others."""
+    encoders = [name for name, one in told.items() if one.per_turn]
+    motors = [name for name in encoders if label(name, "", told[name].words).motor]
+    return motors[0] if len(motors) == 1 < len(encoders) else ""
+
+
+def _as_angle(told: ToldColumn) -> ToldColumn:
+    return told._replace(unit="deg", step=360.0 / told.per_turn) if told.per_turn else told
 
 
 def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:

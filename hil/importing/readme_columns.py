@@ -20,17 +20,19 @@ _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
-_PER_TURN = re.compile(r"\d+\s+(\w+)(?: ?/ ?| per | pro | je | par )")  # 65536 counts per turn
+_PER_TURN = re.compile(r"(?<![\d.,])(\d+)\s+(\w+)(?: ?/ ?| (?:per|pro|je|par|por|al) )")  # 65536 counts per turn
+_CELLS = re.compile(r"\s*\|(.+)\|\s*")  # a row of a table
 _NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
 _FEWEST = 3  # columns that a sentence lists: fewer are words
 
 
 class ToldColumn(NamedTuple):
-    """Words and unit of a column, "" without; a count is `step` units, where one is told."""
+    """Words and unit of a column, "" without; a count is `step` units, and a turn has `per_turn` counts, where told."""
 
     words: str
     unit: str
     step: float | None = None
+    per_turn: int | None = None
 
 
 def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldColumn]:
@@ -38,6 +40,7 @@ def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldCo
 
     A line that begins with a name goes before one in which it stands, a unit before the size of a count.
     """
+    lines = [_plain_line(line) for line in lines]
     told, ranks = dict[str, ToldColumn](), dict[str, tuple[bool, bool]]()
     mentions = [[(name, True, text)] for name, text in _numbered(lines, names)]
     mentions += [_mentions(line, [one for one in names if one]) for line in lines]
@@ -51,6 +54,13 @@ def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldCo
             if one.unit and (name not in told or rank > ranks[name]):
                 told[name], ranks[name] = one, rank
     return told if len(told) > 1 else _in_a_row(" ".join(lines), names)
+
+
+def _plain_line(line: str) -> str:
+    """A line of Markdown as a list has it: a row of a table with a colon behind its first cell, no signs of code."""
+    line = line.replace("`", "")
+    cells = [cell.strip() for cell in match[1].split("|")] if (match := _CELLS.fullmatch(line)) else []
+    return f"- {cells[0]}: {', '.join(cells[1:])}" if len(cells) > 1 else line
 
 
 def _numbered(lines: Sequence[str], names: Sequence[str]) -> list[tuple[str, str]]:
@@ -103,8 +113,9 @@ def _told(text: str) -> ToldColumn:
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
     words = phrases[0] if phrases and phrases[0] != unit else ""
     counts = unit_named(unit) == "counts"
-    if (unit and not counts) or any(unit_named(one[1]) == "counts" for one in _PER_TURN.finditer(text)):
-        return ToldColumn(words, unit)
+    per_turn = next((int(one[1]) for one in _PER_TURN.finditer(text) if unit_named(one[2]) == "counts"), None)
+    if (unit and not counts) or per_turn:
+        return ToldColumn(words, unit or "counts", per_turn=per_turn)
     steps = (step for part in phrases if (step := _step(part, counts)))
     return next((ToldColumn(words, of_step, size) for size, of_step in steps), ToldColumn(words, unit))
 

@@ -137,7 +137,7 @@ def test_columns_without_a_header_are_listed_by_their_numbers() -> None:
         " 4 motor current in A (kt = 0.07)",
     ]
     told = told_columns(lines, [f"column {number}" for number in range(1, 5)])
-    assert {name: unit for name, (_, unit, _) in told.items() if unit} == {
+    assert {name: unit for name, (_, unit, *_) in told.items() if unit} == {
         "column 1": "s",
         "column 2": "counts",
         "column 4": "A",
@@ -150,7 +150,7 @@ def test_columns_are_listed_in_a_sentence() -> None:
         "iq = current in A rms.",
     ]
     told = told_columns(lines, ["n", "angle", "iq"])
-    assert {name: unit for name, (_, unit, _) in told.items() if unit} == {"angle": "degrees", "iq": "A rms"}
+    assert {name: unit for name, (_, unit, *_) in told.items() if unit} == {"angle": "degrees", "iq": "A rms"}
 
 
 def test_columns_are_listed_in_the_order_of_the_file() -> None:
@@ -159,7 +159,7 @@ def test_columns_are_listed_in_the_order_of_the_file() -> None:
         "after the gear in degrees (20 bit), tau motor torque in Nm at the shaft. Rated torque 0.5 Nm.",
     ]
     told = told_columns(lines, ["t", "qm", "ql", "tau"])
-    assert {name: unit for name, (_, unit, _) in told.items() if unit} == {
+    assert {name: unit for name, (_, unit, *_) in told.items() if unit} == {
         "t": "seconds",
         "qm": "degrees",
         "ql": "degrees",
@@ -180,7 +180,7 @@ def test_a_list_has_units_in_brackets_and_sizes_of_counts() -> None:
         "- mot_inc: motor encoder, 65536 increments per motor turn",
     ]
     names = ["lage_soll", "motormoment", "coppia_permille", "S-0-0047", "S-0-0051", "S-0-0040", "mot_inc"]
-    told = {name: (unit, step) for name, (_, unit, step) in told_columns(lines, names).items()}
+    told = {name: (unit, step) for name, (_, unit, step, _) in told_columns(lines, names).items()}
     assert told == {
         "lage_soll": ("mm", None),
         "motormoment": ("Nm", None),
@@ -188,6 +188,7 @@ def test_a_list_has_units_in_brackets_and_sizes_of_counts() -> None:
         "S-0-0047": ("mm", 1e-4),
         "S-0-0051": ("mm", 1e-4),
         "S-0-0040": ("rpm", 1e-4),
+        "mot_inc": ("counts", None),
     }
 
 
@@ -227,24 +228,21 @@ def test_counts_of_two_encoders_beside_a_lead_make_a_map_that_is_read(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    "said",
+    ("said", "unit"),
     [
-        "motor encoder [counts], 65536 per rev, 10 mm lead",
-        "motor encoder, 0 deg at the end stop, 65536 counts per turn",
-        "motor encoder [inc], 2 ms late, 65536 inc/rev",
-        "motor encoder counts, 65536 per turn, 24 V supply",
-        "position [counts], 300 mm travel",
-        "motor encoder, 10 mm belt",
-        "linear scale, 20 um grating period",
-        "linear scale, 5 um",
+        ("motor encoder [counts], 65536 per rev, 10 mm lead", "counts"),
+        ("motor encoder, 0 deg at the end stop, 65536 counts per turn", "counts"),
+        ("motor encoder [inc], 2 ms late, 65536 inc/rev", "inc"),
+        ("motor encoder counts, 65536 per turn, 24 V supply", "counts"),
+        ("position [counts], 300 mm travel", "counts"),
+        ("motor encoder, 10 mm belt", ""),
+        ("linear scale, 20 um grating period", ""),
+        ("linear scale, 5 um", ""),
     ],
 )
-def test_another_size_beside_a_column_is_not_that_of_its_counts(said: str) -> None:
+def test_another_size_beside_a_column_is_not_that_of_its_counts(said: str, unit: str) -> None:
     told = told_columns([f"- x_1: {said}", "- t: time [s]", "- M: torque [Nm]"], ["x_1", "t", "M"])
-    unit = (
-        "counts" if "[counts]" in said else "inc" if "[inc]" in said else "counts" if "encoder counts" in said else ""
-    )
-    assert told.get("x_1", told_columns([], [])) == (told["x_1"]._replace(unit=unit, step=None) if unit else {})
+    assert [(one.unit, one.step) for name, one in told.items() if name == "x_1"] == ([(unit, None)] if unit else [])
 
 
 @pytest.mark.parametrize(
@@ -293,3 +291,19 @@ def test_a_current_with_a_force_constant_is_that_of_a_linear_motor(tmp_path: Pat
     )
     entries = {one.channel: one.entry for one in draft_map(source, readme=readme).channels}
     assert entries["force_n"]["force_constant_n_a"] == 95.0
+
+
+def test_counts_per_turn_beside_a_column_are_its_own(tmp_path: Path) -> None:
+    """Of two encoders in a table of the README each has its own."""
+    angle = AXIS["angle"]
+    columns = {"t_s": AXIS["t"], "enc_m": np.round(4096 / (2.0 * np.pi) * 50.0 * angle), "par": AXIS["torque"]}
+    columns["enc_eje"] = np.round(524288 / (2.0 * np.pi) * (angle - 1e-3 * AXIS["torque"]))  # behind a spring
+    source, readme = write(tmp_path / "log.parquet", columns), tmp_path / "notes.md"
+    readme.write_text(
+        "Reductor 50:1\n\n| columna | significado |\n|---|---|\n| t_s | tiempo, s |\n| par | par del motor, Nm |\n"
+        "| enc_m | encoder del motor, 4096 cuentas por vuelta |\n| `enc_eje` | encoder, 524288 cuentas por vuelta |\n"
+    )
+    import_(source, None, tmp_path / "out.parquet", readme=readme)
+    recording = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(np.ptp(recording["motor_position_rad"]), 50.0 * np.ptp(angle), rtol=1e-3)
+    np.testing.assert_allclose(np.ptp(recording["table_position_m"]), np.ptp(angle), rtol=0.01)

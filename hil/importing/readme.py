@@ -53,7 +53,7 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
-    if motor := _motor_of_two(told):  # each encoder has its own counts
+    if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
         told = {name: one if name == motor else _as_angle(one) for name, one in told.items()}
     steps = {name: one.step for name, one in told.items() if one.step and name not in table.units}
@@ -66,11 +66,10 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     )
 
 
-def _motor_of_two(told: Mapping[str, ToldColumn]) -> str:
-    """The motor's encoder among columns of which counts per turn are told; "" where there are no others."""
-    encoders = [name for name, one in told.items() if one.per_turn]
-    motors = [name for name in encoders if label(name, "", told[name].words).motor]
-    return motors[0] if len(motors) == 1 < len(encoders) else ""
+def _motor_encoder(told: Mapping[str, ToldColumn]) -> str:
+    """The column of the motor's encoder, if counts per turn are told of one; "" else."""
+    motors = [name for name, one in told.items() if one.per_turn and label(name, "", one.words).motor]
+    return motors[0] if len(motors) == 1 else ""
 
 
 def _as_angle(told: ToldColumn) -> ToldColumn:

@@ -307,3 +307,14 @@ def test_counts_per_turn_beside_a_column_are_its_own(tmp_path: Path) -> None:
     recording = read_recording(tmp_path / "out.parquet")
     np.testing.assert_allclose(np.ptp(recording["motor_position_rad"]), 50.0 * np.ptp(angle), rtol=1e-3)
     np.testing.assert_allclose(np.ptp(recording["table_position_m"]), np.ptp(angle), rtol=0.01)
+
+
+def test_counts_of_the_motor_are_not_measured_where_they_are_told(tmp_path: Path) -> None:
+    motor = AXIS["angle"]
+    columns = {"t": AXIS["t"], "Geber1_Motor": np.round(4096 / (2.0 * np.pi) * motor), "M": AXIS["torque"]}
+    columns["Geber2"] = np.round(1.0001 * 0.035904 / (2.0 * np.pi) * motor / 5e-6)
+    source, readme = write(tmp_path / "log.parquet", columns), tmp_path / "notes.txt"
+    lines = ["35,904 mm je Motorumdrehung", "- t: s", "- Geber1_Motor: 4096 Ink je Motorumdrehung"]
+    readme.write_text("\n".join([*lines, "- Geber2: Maßstab, 1 Ink = 5 µm", "- M: Moment, Nm", ""]))
+    entries = {one.channel: one.entry for one in draft_map(source, readme=readme).channels}
+    assert entries["motor_position_rad"]["counts_per_rev"] == 4096

@@ -55,7 +55,7 @@ def draft_axis(
     split = split_of(plant.inertia, recording, lead.value, turns)
     axis = _with_friction_of_load(drafted(split), plant, transmission, lead)
     share = axis.share_of_load
-    by_sag = turns and _sagging(plant, transmission) is not None  # then the spring is told without a split
+    by_sag = turns and _sagging(plant, transmission) is not None  # the sag alone tells the stiffness
     if share is not None and share.value > 1.0 and not (split.told or by_sag):
         axis = _with_friction_of_load(drafted(split.lighter(0.5 / share.value)), plant, transmission, lead)
         share = axis.share_of_load

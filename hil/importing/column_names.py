@@ -126,7 +126,7 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
 
 
 def _words_of_address(name: str) -> str:
-    """What the value is whose address in a drive a name holds, 0x6064 or S-0-0051, or is, 6064; "" without one."""
+    """Words for the address of a drive's value in a name, 0x6064 or S-0-0051, or for a name that is one; "" without."""
     address = _ADDRESS_OF_DRIVE.search(name) or _OBJECT.fullmatch(name.strip())
     found = next((one for one in address.groups() if one), "") if address else ""
     return lexicon().addresses.get(found.lower(), "")

@@ -55,7 +55,7 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
     if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
-        told = {name: one if name == motor else _as_angle(one) for name, one in told.items()}
+        told = {name: _as_angle(name, one) if name != motor else one for name, one in told.items()}
     steps = {name: one.step for name, one in told.items() if one.step and name not in table.units}
     return replace(
         table,
@@ -72,8 +72,10 @@ def _motor_encoder(told: Mapping[str, ToldColumn]) -> str:
     return motors[0] if len(motors) == 1 else ""
 
 
-def _as_angle(told: ToldColumn) -> ToldColumn:
-    return told._replace(unit="deg", step=360.0 / told.per_turn) if told.per_turn else told
+def _as_angle(name: str, told: ToldColumn) -> ToldColumn:
+    """A column of another encoder, with counts per turn of its own, as an angle; a set-point is in those of a drive."""
+    own = told.per_turn and not label(name, "", told.words).command
+    return told._replace(unit="deg", step=360.0 / told.per_turn) if own and told.per_turn else told
 
 
 def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:

@@ -1,4 +1,4 @@
-"""What a README says of the columns of a file: words, unit, and the size of one count.
+"""What a README tells about the columns of a file: words, unit, and the size of one count.
 
 A list has a line for each, "q_mot   motor encoder, degrees of the motor", "- force [N], measured"; of a file without a
 header by number, "3. scale [counts], 0.2 um each". A name that is no word, with a digit or an underscore, may stand
@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hil.importing.lexicon import lexicon
+from hil.importing.lexicon import lexicon, without_accents
 from hil.importing.units import factor_and_unit, unit_named
 
 _WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
@@ -20,7 +20,11 @@ _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
-_PER_TURN = re.compile(r"(?<![\d.,])(\d+)\s+(\w+)(?: ?/ ?| (?:per|pro|je|par|por|al) )")  # 65536 counts per turn
+_PER_TURN = re.compile(  # 65536 counts per motor turn
+    r"(?<![\d.,])(\d+)\s+(\w+)(?: ?/ ?| (?:per|pro|je|par|por|al) )"
+    r"(?:\w+[ -])?(?:motor)?(?:turn|rev|umdr|tour|giro|vuelta)",
+    re.IGNORECASE,
+)
 _CELLS = re.compile(r"\s*\|(.+)\|\s*")  # a row of a table
 _NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
 _FEWEST = 3  # columns that a sentence lists: fewer are words
@@ -36,7 +40,7 @@ class ToldColumn(NamedTuple):
 
 
 def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldColumn]:
-    """What `lines` say of columns with the `names`; nothing where they tell fewer than two units.
+    """What `lines` tell about the columns `names`: in a list, or in a sentence where a list tells fewer than two units.
 
     A line that begins with a name goes before one in which it stands, a unit before the size of a count.
     """
@@ -101,7 +105,7 @@ def _phrases(text: str) -> list[str]:
 
 
 def _of_both(text: str) -> ToldColumn | None:
-    """What a phrase such as "both 0.0001 mm" says of the column before, too; None without one."""
+    """Unit and step that a phrase such as "both 0.0001 mm" gives the column before it, too; None without one."""
     begin = rf"(?:{'|'.join(lexicon().both)})\s+"
     found = (_told(re.sub(begin, "", phrase)) for phrase in _phrases(text) if re.match(begin, phrase))
     return next((one for one in found if one.unit), None)
@@ -113,7 +117,9 @@ def _told(text: str) -> ToldColumn:
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
     words = phrases[0] if phrases and phrases[0] != unit else ""
     counts = unit_named(unit) == "counts"
-    per_turn = next((int(one[1]) for one in _PER_TURN.finditer(text) if unit_named(one[2]) == "counts"), None)
+    per_turn = next(
+        (int(one[1]) for one in _PER_TURN.finditer(text) if unit_named(without_accents(one[2])) == "counts"), None
+    )
     if (unit and not counts) or per_turn:
         return ToldColumn(words, unit or "counts", per_turn=per_turn)
     steps = (step for part in phrases if (step := _step(part, counts)))

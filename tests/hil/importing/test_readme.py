@@ -170,7 +170,7 @@ def test_columns_are_listed_in_the_order_of_the_file() -> None:
 
 
 def test_a_list_has_units_in_brackets_and_sizes_of_counts() -> None:
-    """As drives and data sheets write them; "0.1 % of" is a permille, and "both" is said of the column before, too."""
+    """0.1 % of the rated torque is a permille; a size behind "both" is also that of the column before."""
     lines = [
         "- lage_soll [mm], Sollwert",
         "- motormoment [Nm] an der Motorwelle",
@@ -294,7 +294,7 @@ def test_a_current_with_a_force_constant_is_that_of_a_linear_motor(tmp_path: Pat
 
 
 def test_counts_per_turn_beside_a_column_are_its_own(tmp_path: Path) -> None:
-    """Of two encoders in a table of the README each has its own."""
+    """A table in the README gives counts per turn for the motor's encoder and for the second one."""
     angle = AXIS["angle"]
     columns = {"t_s": AXIS["t"], "enc_m": np.round(4096 / (2.0 * np.pi) * 50.0 * angle), "par": AXIS["torque"]}
     columns["enc_eje"] = np.round(524288 / (2.0 * np.pi) * (angle - 1e-3 * AXIS["torque"]))  # behind a spring
@@ -318,3 +318,19 @@ def test_counts_of_the_motor_are_not_measured_where_they_are_told(tmp_path: Path
     readme.write_text("\n".join([*lines, "- Geber2: Maßstab, 1 Ink = 5 µm", "- M: Moment, Nm", ""]))
     entries = {one.channel: one.entry for one in draft_map(source, readme=readme).channels}
     assert entries["motor_position_rad"]["counts_per_rev"] == 4096
+
+
+@pytest.mark.parametrize(
+    ("said", "per_turn"),
+    [
+        ("motor encoder, 65536 counts per turn", 65536),
+        ("Geber, 4096 Ink je Motorumdrehung", 4096),
+        ("encoder, 4096 cuentas por vuelta de motor", 4096),
+        ("codeur, 8192 incréments par tour", 8192),
+        ("scale of the slide, 1000 counts per mm", None),
+        ("linear motor, 200 inc/mm", None),
+    ],
+)
+def test_counts_per_length_are_none_per_turn(said: str, per_turn: int | None) -> None:
+    told = told_columns([f"- x_1: {said}", "- t: time [s]", "- M: torque [Nm]"], ["x_1", "t", "M"])
+    assert (told["x_1"].per_turn if "x_1" in told else None) == per_turn

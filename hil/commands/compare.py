@@ -30,7 +30,7 @@ def compare(
     recording = read_run(run)
     believed = load_bench(bench) if bench else bench_of(recording)
     folder = folder or default_folder(f"compare-{recording.name}")
-    compile_kernels()
+    compile_kernels(of_loop=False)
     parts, left_out = recording.parts(), list[str]()
     done = list[tuple[Comparison, Path]]()
     with new_folder(folder) as target, progress() as tell:

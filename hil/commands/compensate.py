@@ -59,7 +59,7 @@ def compensate(
     found = path.with_name("diagnosis.json")
     result = Result.model_validate_json(found.read_text(encoding="utf-8")) if is_file(found) else None
     motion = plan(load_profile(profile), diagnosed.period_s)
-    compile_kernels()
+    compile_kernels(of_loop=False)
     drawn = tuple(drawn_benches(diagnosed, result, DRAWS)) if result is not None else ()
     loops = tune(diagnosed, drawn)
     table(HEADERS, margin_rows(loops, diagnosed.axis.drive_unit), right=False)

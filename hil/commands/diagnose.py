@@ -56,7 +56,7 @@ def diagnose(
 
     believed = load_bench(bench) if bench else bench_of(train[0])
     folder = folder or default_folder(f"diagnose-{train[0].name}")
-    compile_kernels()
+    compile_kernels(of_loop=False)
     with new_folder(folder) as part:
         with progress() as tell:
             diagnosis = diagnose_recordings(train, held_out, believed, tell, budget_s)

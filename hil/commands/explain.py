@@ -55,7 +55,7 @@ def explain(
 
         def look(lines: list[str]) -> None:
             print_look(lines)
-            compile_kernels(tell)
+            compile_kernels(tell, of_loop=False)
 
         def answer(diagnosis: "Diagnosis") -> None:
             from hil.report.summary import print_diagnosis

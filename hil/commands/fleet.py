@@ -86,7 +86,7 @@ def fleet(
         raise InputError("--tls: given without --scheduler, allowed with the address of one, tls://HOST:8786")
     recordings = Store(folder)
     place = Store(results) if results else recordings.within(RESULTS)
-    compile_kernels()
+    compile_kernels(of_loop=False)
     with ExitStack() as stack, progress() as tell:
         count = workers or len(os.sched_getaffinity(0))
         connect = cache(lambda: stack.enter_context(cluster(scheduler, tls) if scheduler else own_cluster(count)))

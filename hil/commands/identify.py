@@ -31,7 +31,7 @@ def identify(
     if target.suffix not in (".yaml", ".yml"):
         raise InputError(f"{target}: given the ending {target.suffix!r}, allowed .yaml; correct --out")
     recordings = [read_run(run) for run in runs]
-    compile_kernels()
+    compile_kernels(of_loop=False)
     found = drafted(recordings)
     draft = found.draft
     write_text(target, found.text)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hil.compiled.kernel_cache import provide_kernel_cache
 from hil.report.console import Progress, out, progress
+
+if TYPE_CHECKING:
+    from hil.motion.trajectory import Trajectory
 
 
 def warm_up() -> None:
@@ -15,54 +19,67 @@ def warm_up() -> None:
     out.print(f"All kernels are compiled in {provide_kernel_cache()}")
 
 
-def compile_kernels(shown: Progress | None = None) -> None:
-    """Compile all kernels if they are not compiled yet; raises HilError without a cache folder.
+def compile_kernels(shown: Progress | None = None, of_loop: bool = True) -> None:
+    """Compile the kernels that are not compiled yet; raises HilError without a cache folder.
 
-    Progress goes to the bar `shown`, or to one of its own.
+    Of the twin, and `of_loop` of the loop on the simulated bus. Progress goes to the bar `shown`, or to one of its own.
     """
-    if kernels_are_compiled():
+    if kernels_are_compiled(of_loop):
         return
-    mark, versions = _mark(), _versions()
     with progress() if shown is None else nullcontext(shown) as tell:
-        task = "compiling kernels, once after the installation: about a minute"
+        task = f"compiling kernels, once after the installation: {'about a minute' if of_loop else 'half a minute'}"
         tell(task, 0.0)
-        # imported late: the kernels are built by the first imports
-        import numpy as np
-
-        from hil.api import simulate
-        from hil.bench.bench_file import load_bench
-        from hil.control import cascade
-        from hil.diagnosis.search.change_points import segments
-        from hil.motion.trajectory import plan
-        from hil.validation.proof.draw.demo import from_rest, there_and_back
-
-        bench = load_bench("reference")
-        motion = plan(from_rest("", there_and_back(0.01, 0.05)), bench.period_s)
-        recording = simulate(bench, motion)
-        tell(task, 0.5)
-        bench.twin().simulate(motion.position_m, motion.velocity_m_s)  # read-only, of which numba makes another kernel
-        tell(task, 0.65)
-        setpoints = (recording["position_command_m"], recording["velocity_command_m_s"])
-        measured = bench.twin().simulate(*setpoints)
-        tell(task, 0.8)
-        bench.twin().observe(*setpoints, measured)
-        bench.twin().command(*setpoints, measured)
-        tell(task, 0.9)
-        cascade.replay(bench.gains, cascade.init(0.0), *setpoints, measured.motor_position, measured.table_position_m)
-        bench.twin().drive(measured.torque_command)
-        segments(measured.torque, np.ones(measured.torque.size), 1.0, 1.0)
-        tell(task, 1.0)
-    mark.write_text(versions, encoding="utf-8")
+        _of_twin()
+        _mark(False).write_text(_versions(), encoding="utf-8")
+        if of_loop:
+            tell(task, 0.4)
+            _of_loop()
+            _mark(True).write_text(_versions(), encoding="utf-8")
 
 
-def kernels_are_compiled() -> bool:
-    """Return True if all kernels are in the cache, for these versions of numba and Python and this processor."""
-    mark = _mark()
-    return mark.exists() and mark.read_text(encoding="utf-8") == _versions()
+def _of_twin() -> None:
+    # imported late: the kernels are built by the first imports
+    import numpy as np
+
+    from hil.bench.bench_file import load_bench
+    from hil.control import cascade
+    from hil.diagnosis.search.change_points import segments
+
+    bench, motion = load_bench("reference"), _motion()
+    twin, read_only = bench.twin(), (motion.position_m, motion.velocity_m_s)
+    twin.simulate(*read_only)  # of which numba makes another kernel
+    setpoints = (motion.position_m.copy(), motion.velocity_m_s.copy())
+    measured = twin.simulate(*setpoints)
+    twin.observe(*setpoints, measured)
+    twin.command(*setpoints, measured)
+    cascade.replay(bench.gains, cascade.init(0.0), *setpoints, measured.motor_position, measured.table_position_m)
+    twin.drive(measured.torque_command)
+    segments(measured.torque, np.ones(measured.torque.size), 1.0, 1.0)
 
 
-def _mark() -> Path:
-    return provide_kernel_cache() / "compiled.txt"
+def _of_loop() -> None:
+    from hil.api import simulate
+    from hil.bench.bench_file import load_bench
+
+    simulate(load_bench("reference"), _motion())
+
+
+def _motion() -> Trajectory:
+    from hil.bench.bench_file import load_bench
+    from hil.motion.trajectory import plan
+    from hil.validation.proof.draw.demo import from_rest, there_and_back
+
+    return plan(from_rest("", there_and_back(0.01, 0.05)), load_bench("reference").period_s)
+
+
+def kernels_are_compiled(of_loop: bool = True) -> bool:
+    """Return True if the kernels are in the cache, for these versions of numba and Python and this processor."""
+    marks = [_mark(True)] if of_loop else [_mark(True), _mark(False)]
+    return any(mark.exists() and mark.read_text(encoding="utf-8") == _versions() for mark in marks)
+
+
+def _mark(of_loop: bool) -> Path:
+    return provide_kernel_cache() / ("compiled.txt" if of_loop else "compiled-twin.txt")
 
 
 def _versions() -> str:

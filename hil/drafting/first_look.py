@@ -10,13 +10,14 @@ from hil.drafting.plant_told import PlantTold, moving_parts, plant_told
 from hil.errors import InputError
 from hil.identification.following import following
 from hil.identification.least_squares import Estimate
+from hil.identification.turn_waves import turn_waves
 from hil.quantities import digits, percent, quantity
 from hil.recording.recording import Recording
 
 
 def first_look(recordings: Sequence[Recording]) -> list[str]:
-    """Lines on recordings of one axis: duration and speed, plain model with standard errors, second encoder,
-    lateness behind the set-points.
+    """Lines on recordings of one axis: duration and speed, plain model with standard errors, waves of the torque over
+    a turn, second encoder, lateness behind the set-points.
 
     What cannot be told is said with its reason; nothing is raised.
     """
@@ -26,7 +27,7 @@ def first_look(recordings: Sequence[Recording]) -> list[str]:
         told = plant_told(parts)
     except InputError as error:
         return [f"No plain model: {error}"]
-    return [*lines, *_plain(told, parts[0]), *_second_encoder(told), *_following(told, parts[0])]
+    return [*lines, *_plain(told, parts[0]), *_over_turn(parts), *_second_encoder(told), *_following(told, parts[0])]
 
 
 def _moves(parts: Sequence[Recording]) -> str:
@@ -58,6 +59,16 @@ def _plain(told: PlantTold, recording: Recording) -> list[str]:
         f"Plain model: {values}; it leaves {percent(plant.left)} of the "
         f"{effort} (share of its standard deviation){_when(plant.early_s, effort)}."
     ]
+
+
+def _over_turn(parts: Sequence[Recording]) -> list[str]:
+    """What of the torque repeats with each turn of the motor; nothing without a torque of a motor that turns."""
+    names = parts[0].axis
+    if parts[0].kind is AxisKind.LINEAR or names.torque not in parts[0].columns:
+        return []
+    waves = turn_waves([(part[names.motor_position], part[names.torque]) for part in parts], parts[0].period_s)
+    told = ", ".join(f"{wave.order} times with {quantity(wave.amplitude, 'N m')}" for wave in waves)
+    return [f"Over a turn of the motor the torque repeats {told}: cogging, ripple, or an encoder."] if told else []
 
 
 def _when(early_s: Estimate | None, effort: str) -> str:

@@ -98,9 +98,13 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
             of = f"of the rated or the largest {whole}, as the drive has it"
             entry.asked["rated"] = f"is in {unit} {of}; write the {si} at 100 % {_UNKNOWN}{screw}"
         return entry
-    header = constants.get(Constant.FORCE if linear else Constant.TORQUE)
-    if unit == "A" and header is not None:
-        entry.keys[key] = header.value
+    per_unit = {
+        "A": Constant.FORCE if linear else Constant.TORQUE,
+        "V": Constant.FORCE_GAIN if linear else Constant.TORQUE_GAIN,
+    }
+    header = constants.get(per_unit[unit]) if unit in per_unit else None
+    if header is not None:
+        entry.keys[key if unit == "A" else "gain"] = header.value
         entry.notes.append(f"{column}: its constant is taken from the header of the file: {header.text}")
         return entry
     positive = [name for name, value in table.scalars.items() if 0.0 < value < np.inf]

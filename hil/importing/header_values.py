@@ -59,6 +59,15 @@ _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other me
 _IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
 
 
+_ELECTRIC = {"A": ("A", 1.0), "mA": ("A", 1e-3), "V": ("V", 1.0), "mV": ("V", 1e-3)}
+_CONSTANTS = {  # by the unit above and below
+    ("N m", "A"): Constant.TORQUE,
+    ("N", "A"): Constant.FORCE,
+    ("N m", "V"): Constant.TORQUE_GAIN,
+    ("N", "V"): Constant.FORCE_GAIN,
+}
+
+
 def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Constant, HeaderValue]:
     """Constants of header `lines` and `scalars`. One that is given twice with different values is left out."""
     given = [one for line in _without_products(list(lines)) for one in _statements(line)]
@@ -203,7 +212,7 @@ def _says_all(known: ConstantWords, words: str) -> bool:
 
 
 def _of_ratio(value: float, unit: str) -> tuple[Constant, float] | None:
-    """Constant whose unit is a ratio: N m/A, N/A, counts/rev, bit/rev, counts/mm, mm/rev."""
+    """Constant whose unit is a ratio: N m/A, N/V, counts/rev, bit/rev, counts/mm, mm/rev."""
     parts = _PER.split(unit)
     if len(parts) != 2 or not all(parts):
         return None
@@ -213,8 +222,9 @@ def _of_ratio(value: float, unit: str) -> tuple[Constant, float] | None:
     above, below = unit_named(parts[0]), unit_named(parts[1])
     si, factor = UNITS.get(above or "", ("", 0.0))
     below_si, below_factor = UNITS.get(below or "", ("", 1.0))
-    if below in ("A", "mA") and si in ("N m", "N"):
-        return (Constant.TORQUE if si == "N m" else Constant.FORCE), value * factor / (1.0 if below == "A" else 1e-3)
+    electric, prefix = _ELECTRIC.get(below or "", ("", 1.0))
+    if (si, electric) in _CONSTANTS:
+        return _CONSTANTS[si, electric], value * factor / prefix
     if above == "counts" and below == "rev":
         return Constant.COUNTS, value
     if above == "counts" and below_si == "m":

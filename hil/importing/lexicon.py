@@ -59,6 +59,8 @@ class Constant(StrEnum):
     RATE = "rate"  # [Hz], of the rows
     TORQUE = "torque_constant"  # [N m/A]
     FORCE = "force_constant"  # [N/A]
+    TORQUE_GAIN = "torque_gain"  # [N m/V], of an output of a controller or a drive
+    FORCE_GAIN = "force_gain"  # [N/V]
     LEAD = "lead"  # [m]
     COUNTS = "counts_per_rev"
     COUNTS_PER_M = "counts_per_m"

@@ -1,8 +1,8 @@
 """Take numbers of an unknown unit as they are, so that their axis can be looked at before the unit is known.
 
 A motion in numbers of its own unit has the same effects at the same places; masses, friction and stiffness are
-multiples, as if one of the numbers were the SI unit of its channel. A second encoder that is a length needs the lead:
-that is asked all the same.
+multiples, as if one of the numbers were the SI unit of its channel. So are those at the motor of a screw whose lead
+nobody tells.
 """
 
 from math import tau
@@ -24,11 +24,17 @@ COUNT_AS = "its numbers count as"  # in the note on a channel of unknown size
 
 
 def take_own_units(draft: MapDraft) -> None:
-    """Answer what a draft asks of the size of numbers, and note it as unsure; columns and the lead are asked still."""
+    """Answer what a draft asks of the size of numbers, and note it as unsure; columns are asked still."""
     sizes = {(one.channel, key): value for one in draft.channels for key, value in one.entry.items()}
     without_column = {one.channel for one in draft.asked if one.key == "column"}
     left = list[Asked]()
     for one in draft.asked:
+        if one.key == "lead_m" and draft.lead_m is not None:
+            draft.unsure.append(
+                f"lead_m: {1e3 * draft.lead_m:g} mm per turn of the motor are taken, so that values at the motor and "
+                f"counts of turns are multiples; correct it: {one.what}"
+            )
+            continue
         unit = CHANNELS[one.channel].unit if one.channel else ""
         value = unit if one.key == "unit" else _ONE.get(one.key)
         if isinstance(value, float) and one.key in _COUNTED:  # of several in counts, the first is the measure

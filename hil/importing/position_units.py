@@ -25,7 +25,10 @@ from hil.importing.units import unit_named
 from hil.importing.usual_values import USUAL, improbable, screw_units
 from hil.quantities import UNITS
 
-_TOLD = {"N m": (Constant.TORQUE, Constant.RATED_TORQUE), "N": (Constant.FORCE, Constant.RATED_FORCE)}
+_TOLD = {
+    "N m": (Constant.TORQUE, Constant.TORQUE_GAIN, Constant.RATED_TORQUE),
+    "N": (Constant.FORCE, Constant.FORCE_GAIN, Constant.RATED_FORCE),
+}
 
 
 def effort_si(effort: Label | None, draft: MapDraft) -> str | None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from command_line import hil
 
-from hil.commands.warm_up import compile_kernels
+from hil.commands.warm_up import compile_kernels, kernels_are_compiled
 from hil.compiled.kernel_cache import provide_kernel_cache
 
 SAID = "compiling kernels, once after the installation: about a minute ..."
@@ -34,6 +34,22 @@ def test_another_numba_python_or_processor_compiles_again(capsys: pytest.Capture
     assert mark.read_text() == now
     compile_kernels()
     assert capsys.readouterr().err == ""
+
+
+def test_kernels_of_the_loop_are_not_needed_to_explain(capsys: pytest.CaptureFixture[str]) -> None:
+    """A diagnosis compiles those of the twin alone; whoever has all has those, too."""
+    mark = provide_kernel_cache() / "compiled.txt"
+    now = mark.read_text()
+    mark.write_text("numba 0.1")
+    try:
+        compile_kernels(of_loop=False)
+        capsys.readouterr()
+        assert kernels_are_compiled(of_loop=False)
+        assert not kernels_are_compiled()
+    finally:
+        mark.write_text(now)
+    (mark.parent / "compiled-twin.txt").unlink()
+    assert kernels_are_compiled(of_loop=False)
 
 
 @pytest.mark.long

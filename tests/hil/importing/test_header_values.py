@@ -27,6 +27,8 @@ AXIS = axis()
         ("Constante de par: 0,42 N·m/A", Constant.TORQUE, 0.42),
         ("torque constant 50 mN m/A at 20 C", Constant.TORQUE, 0.05),
         ("Force constant = 67 N/A", Constant.FORCE, 67.0),
+        ("gtau = 35.15 N/V", Constant.FORCE_GAIN, 35.15),
+        ("torque monitor 0.4 N m/V", Constant.TORQUE_GAIN, 0.4),
         ("Lead [mm];5", Constant.LEAD, 0.005),
         ("Encoder counts per rev,10000", Constant.COUNTS, 10000.0),
         ("Nennmoment (Nm): 1,27", Constant.RATED_TORQUE, 1.27),

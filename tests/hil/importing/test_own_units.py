@@ -44,11 +44,12 @@ def test_a_position_counts_as_its_own_numbers(tmp_path: Path) -> None:
     assert any("its numbers count as" in note for note in notes)
 
 
-def test_a_lead_is_asked_still(tmp_path: Path) -> None:
-    """Of a position in mm and a torque the metres per revolution have no value to begin with."""
-    _, _, asked = imported(tmp_path, t="t", x_act="x_act_mm", torque="torque_Nm")
-    assert len(asked) == 1
-    assert asked[0].startswith("lead_m")
+def test_without_a_lead_the_motor_is_told_in_multiples(tmp_path: Path) -> None:
+    columns, notes, asked = imported(tmp_path, t="t", x_act="x_act_mm", torque="torque_Nm")
+    assert not asked
+    travel = 1e-3 * axis()["x_act"]
+    assert columns["motor_position_rad"] == pytest.approx(2.0 * np.pi * travel / 0.010, abs=1e-6)
+    assert any(note.startswith("lead_m: 10 mm per turn of the motor are taken") for note in notes)
 
 
 def test_a_value_beside_its_question_answers_it() -> None:

@@ -10,13 +10,13 @@ import pytest
 from foreign_axis import axis, csv_text
 
 from hil.drafting.first_look import first_look
-from hil.errors import InputError, PartOfAxis
-from hil.explanation import explain
+from hil.errors import PartOfAxis
 from hil.importing.by_map import import_recording
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
 from hil.importing.encoder_counts import counts_ratio
 from hil.importing.map_draft import MapDraft
+from hil.importing.map_text import map_text
 from hil.importing.own_units import take_own_units
 
 AXIS = axis(4000)
@@ -124,15 +124,16 @@ def test_other_units_beside_a_step_are_no_steps(name: str) -> None:
 
 
 def test_steps_beside_a_linear_scale_tell_all_but_the_lead(tmp_path: Path) -> None:
-    """Delay, lost motion and scale of an axis without a torque; the travel per turn is asked."""
-    folder, source, late = tmp_path / "out", tmp_path / "log.csv", 0.004
+    """Delay, lost motion and scale of an axis without a torque; the travel per turn is taken, and can be corrected."""
+    source, late = tmp_path / "log.csv", 0.004
     angle = np.interp(T - late, T, AXIS["angle"])
     scale = np.round(1e4 * angle / (2 * np.pi) * 5.0) / 1e4
     source.write_text(csv_text({"t_s": T, "Sollschritte": STEPS, "Massstab [mm]": scale}))
-    with pytest.raises(InputError, match=r"lead_m: Sollschritte counts along a length"):
-        explain(source, folder)
-    path = folder / "log-map.yaml"
-    path.write_text(re.sub(r"^lead_m:.*", "lead_m: 0.005", path.read_text(), flags=re.MULTILINE))
+    draft = draft_map(source)
+    take_own_units(draft)
+    assert any("lead_m: 10 mm per turn of the motor are taken" in note for note in draft.unsure)
+    path = tmp_path / "map.yaml"
+    path.write_text(re.sub(r"^lead_m:.*", "lead_m: 0.005", map_text(draft), flags=re.MULTILINE))
     look = first_look([import_recording(source, path)])
     assert look[1].startswith("No torque is recorded")
     found = re.search(r"0\.0050\d* m .* per revolution of the motor.*, ([\d.]+) ms late", look[2])

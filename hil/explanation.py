@@ -147,7 +147,7 @@ def explain(
         how = join_logs(paths, joined, any(_is_whole(one, told) for one in paths))
         read, assumed = _recordings([joined], folder, told._replace(rate_hz=None), progress)
         assumed = [how, *assumed]
-    look(first_look(read))
+    look(first_look(read, turns_told=not any(COUNT_AS in one and "torque" not in one for one in assumed)))
     progress("taking the bench, or drafting it")
     bench, draft, notes = _bench(read, folder / BENCH)
     warnings = [one for one in notes if OUTDATED in one]

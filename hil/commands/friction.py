@@ -47,7 +47,7 @@ def friction(
         believed = load_bench(bench) if profile is None else load_simulated(bench)
     folder = folder or default_folder(f"friction-{(run or Path(str(bench))).stem}")
     if run is None:
-        compile_kernels(of_loop=False)
+        compile_kernels()
     with new_folder(folder) as part, progress() as tell:
         if bench is not None and profile is not None:
             tell("running the feed sweep")

@@ -12,6 +12,8 @@ from hil.report.console import Progress, out, progress
 if TYPE_CHECKING:
     from hil.motion.trajectory import Trajectory
 
+_ALL, _TWIN = "compiled.txt", "compiled-twin.txt"  # marks in the cache: which kernels are there
+
 
 def warm_up() -> None:
     """Compile all kernels now, so that no later command has to; for images and services."""
@@ -22,23 +24,26 @@ def warm_up() -> None:
 def compile_kernels(shown: Progress | None = None, of_loop: bool = True) -> None:
     """Compile the kernels that are not compiled yet; raises HilError without a cache folder.
 
-    Of the twin, and `of_loop` of the loop on the simulated bus. Progress goes to the bar `shown`, or to one of its own.
+    Those of the twin, which a diagnosis takes, and `of_loop` those of the loop on the simulated bus. Progress goes to
+    the bar `shown`, or to one of its own.
     """
     if kernels_are_compiled(of_loop):
         return
     with progress() if shown is None else nullcontext(shown) as tell:
         task = f"compiling kernels, once after the installation: {'about a minute' if of_loop else 'half a minute'}"
         tell(task, 0.0)
-        _of_twin()
-        _mark(False).write_text(_versions(), encoding="utf-8")
+        if not kernels_are_compiled(of_loop=False):
+            _compile_twin()
+            _mark(_TWIN).write_text(_versions(), encoding="utf-8")
         if of_loop:
-            tell(task, 0.4)
-            _of_loop()
-            _mark(True).write_text(_versions(), encoding="utf-8")
+            tell(task, 0.5)
+            _compile_loop()
+            _mark(_ALL).write_text(_versions(), encoding="utf-8")
+        tell(task, 1.0)
 
 
-def _of_twin() -> None:
-    # imported late: the kernels are built by the first imports
+def _compile_twin() -> None:
+    """Compile the kernels of twin, control law and search. Imports are late: the kernels are built by the first."""
     import numpy as np
 
     from hil.bench.bench_file import load_bench
@@ -46,8 +51,8 @@ def _of_twin() -> None:
     from hil.diagnosis.search.change_points import segments
 
     bench, motion = load_bench("reference"), _motion()
-    twin, read_only = bench.twin(), (motion.position_m, motion.velocity_m_s)
-    twin.simulate(*read_only)  # of which numba makes another kernel
+    twin = bench.twin()
+    twin.simulate(motion.position_m, motion.velocity_m_s)  # read-only, of which numba makes another kernel
     setpoints = (motion.position_m.copy(), motion.velocity_m_s.copy())
     measured = twin.simulate(*setpoints)
     twin.observe(*setpoints, measured)
@@ -57,7 +62,8 @@ def _of_twin() -> None:
     segments(measured.torque, np.ones(measured.torque.size), 1.0, 1.0)
 
 
-def _of_loop() -> None:
+def _compile_loop() -> None:
+    """Compile the kernels of the loop and of the simulated axis."""
     from hil.api import simulate
     from hil.bench.bench_file import load_bench
 
@@ -74,12 +80,12 @@ def _motion() -> Trajectory:
 
 def kernels_are_compiled(of_loop: bool = True) -> bool:
     """Return True if the kernels are in the cache, for these versions of numba and Python and this processor."""
-    marks = [_mark(True)] if of_loop else [_mark(True), _mark(False)]
+    marks = [_mark(_ALL)] if of_loop else [_mark(_ALL), _mark(_TWIN)]
     return any(mark.exists() and mark.read_text(encoding="utf-8") == _versions() for mark in marks)
 
 
-def _mark(of_loop: bool) -> Path:
-    return provide_kernel_cache() / ("compiled.txt" if of_loop else "compiled-twin.txt")
+def _mark(name: str) -> Path:
+    return provide_kernel_cache() / name
 
 
 def _versions() -> str:

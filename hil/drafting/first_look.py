@@ -1,6 +1,7 @@
 """What recordings show at once, before any twin: motion, plain model, second encoder, lateness behind set-points."""
 
 from collections.abc import Sequence
+from math import pi
 
 import numpy as np
 
@@ -15,9 +16,9 @@ from hil.quantities import digits, percent, quantity
 from hil.recording.recording import Recording
 
 
-def first_look(recordings: Sequence[Recording]) -> list[str]:
+def first_look(recordings: Sequence[Recording], turns_told: bool = True) -> list[str]:
     """Lines on recordings of one axis: duration and speed, plain model with standard errors, waves of the torque over
-    a turn, second encoder, lateness behind the set-points.
+    a turn, second encoder, lateness behind the set-points. `turns_told`: the angle of the motor is known.
 
     What cannot be told is said with its reason; nothing is raised.
     """
@@ -27,7 +28,13 @@ def first_look(recordings: Sequence[Recording]) -> list[str]:
         told = plant_told(parts)
     except InputError as error:
         return [f"No plain model: {error}"]
-    return [*lines, *_plain(told, parts[0]), *_over_turn(parts), *_second_encoder(told), *_following(told, parts[0])]
+    return [
+        *lines,
+        *_plain(told, parts[0]),
+        *(_over_turn(parts, told) if turns_told else []),
+        *_second_encoder(told),
+        *_following(told, parts[0]),
+    ]
 
 
 def _moves(parts: Sequence[Recording]) -> str:
@@ -61,14 +68,24 @@ def _plain(told: PlantTold, recording: Recording) -> list[str]:
     ]
 
 
-def _over_turn(parts: Sequence[Recording]) -> list[str]:
+def _over_turn(parts: Sequence[Recording], told: PlantTold) -> list[str]:
     """What of the torque repeats with each turn of the motor; nothing without a torque of a motor that turns."""
-    names = parts[0].axis
+    names, early = parts[0].axis, told.plant.early_s
     if parts[0].kind is AxisKind.LINEAR or names.torque not in parts[0].columns:
         return []
-    waves = turn_waves([(part[names.motor_position], part[names.torque]) for part in parts], parts[0].period_s)
-    told = ", ".join(f"{wave.order} times with {quantity(wave.amplitude, 'N m')}" for wave in waves)
-    return [f"Over a turn of the motor the torque repeats {told}: cogging, ripple, or an encoder."] if told else []
+    ratio = told.lead.value / (2.0 * pi) if told.lead and told.turns else None
+    waves = turn_waves(
+        [(part[names.motor_position], part[names.torque]) for part in parts],
+        parts[0].period_s,
+        early.value if early else 0.0,
+        ratio,
+    )
+    each = ", ".join(
+        f"{'once' if wave.order == 1 else f'{wave.order} times'} with {quantity(wave.amplitude, 'N m')}"
+        for wave in waves
+    )
+    causes = "cogging, ripple, an encoder, or moves that repeat with the turn"
+    return [f"Over a turn of the motor the torque repeats {each}: {causes}."] if each else []
 
 
 def _when(early_s: Estimate | None, effort: str) -> str:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from hil.arrays import FloatArray
 from hil.identification.spectrum import spectrum
@@ -101,7 +101,7 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
     ratio = float(contrast.sum()) / (count - 1) * freed / independent
     errors = np.sqrt(np.diag(covariance))
     energy = float(share @ (mean**2 - errors**2))
-    return Structure(edges, mean, errors, energy, float(fisher.sf(ratio, count - 1, freed)))
+    return Structure(edges, mean, errors, energy, float(fdtrc(count - 1, freed, ratio)))
 
 
 def offset(parts: Sequence[ResidualSeries]) -> Structure | None:
@@ -117,7 +117,7 @@ def offset(parts: Sequence[ResidualSeries]) -> Structure | None:
     if not covariance[0, 0] > 0.0 or independent < _FEWEST_INDEPENDENT:
         return None
     variance = float(covariance[0, 0])
-    p = float(fisher.sf(mean**2 / variance, 1, independent))
+    p = float(fdtrc(1, independent, mean**2 / variance))
     edges = np.array([-np.inf, np.inf])
     return Structure(edges, np.array([mean]), np.array([variance**0.5]), mean**2 - variance, p)
 

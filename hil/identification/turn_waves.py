@@ -1,8 +1,8 @@
 """Waves of a torque over the angle of its motor: what repeats with each turn, by the raw channels alone.
 
-    T = J a + D v + C sign(v) + T0 + sum_k A_k sin(k q + p_k)
+    T = J a + D v + C sign(v) + T0 + G sin(r q + q0) + sum_k A_k sin(k q + p_k)        G: of a load that turns
 
-Rows of a standstill count, too: a motor that is held from place to place tells its cogging, and no inertia.
+Rows of a standstill count: a motor that is held at one place after another tells its cogging, though no inertia.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.identification.derivatives import matched
+from hil.identification.derivatives import later_motion, matched
 from hil.identification.plain_model import motion_data, plain_columns
 from hil.identification.structure import ResidualSeries, structure
 
@@ -20,10 +20,10 @@ Rows = NDArray[np.bool_]
 _TURN = 2.0 * np.pi
 _STEPS = 720  # of a turn
 _ORDERS = _STEPS // 4  # highest order: four steps in a wave
-_MET = 0.9  # of the steps of a turn, at least
-_CHANCE = 0.01  # of any wave, over all orders
-_SHARE = 0.1  # of the energy that the plain model and stronger waves leave
-_MOST = 4
+_MET = 0.9  # share of the steps of a turn that the motor passes
+_CHANCE = 0.01  # by which any of all orders may seem to be there
+_SHARE = 0.1  # of the energy that the plain model and stronger waves leave: the least that a wave explains
+_MOST_WAVES, _MOST_ROWS, _FEWEST_ROWS = 4, 100_000, 100
 
 
 class TurnWave(NamedTuple):
@@ -33,40 +33,65 @@ class TurnWave(NamedTuple):
     amplitude: float
 
 
-def turn_waves(parts: Sequence[tuple[FloatArray, FloatArray]], period_s: float) -> list[TurnWave]:
-    """The strongest waves over whole turns of parts (position [rad], torque), each (n,); largest first.
+def turn_waves(
+    parts: Sequence[tuple[FloatArray, FloatArray]],
+    period_s: float,
+    early_s: float = 0.0,
+    load_ratio: float | None = None,
+) -> list[TurnWave]:
+    """The strongest waves of parts (position [rad], torque), each (n,), at most four; largest first.
 
-    Empty where the motor does not reach nine tenths of a turn's angles.
+    The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of a load that turns: its
+    gravity is no wave. Empty where the motor passes less than nine tenths of a turn, or for few rows; of many rows the
+    first count.
     """
-    data = [motion_data(position, torque, period_s) for position, torque in parts]
-    angles, rows = [position for position, _ in parts], [one.rows for one in data]
-    columns = [np.column_stack([*plain_columns(one.moved).values()]) for one in data]
-    torque, orders, fit = [one.torque for one in data], list[int](), np.zeros(0)
-    while len(orders) < _MOST:
-        fit = _least_squares(columns, torque, rows)
-        series = [
-            ResidualSeries(each - column @ fit, at) for each, column, at in zip(torque, columns, rows, strict=True)
-        ]
-        order = _strongest(series, angles, orders)
-        seen = structure(series, [np.mod(order * one, _TURN) for one in angles]) if order else None
-        if seen is None or seen.p * _ORDERS > _CHANCE or seen.energy < _SHARE * _energy(series):
+    angles, torque, columns, rows, windows = [], [], [], [], []
+    for position, given in _first(parts):
+        data = motion_data(position, given, period_s)
+        early, row = early_s / period_s, np.arange(position.size)
+        moved = later_motion(data.moved, early)
+        angles.append(np.interp(row + early, row, position))
+        torque.append(data.torque)
+        columns.append(np.column_stack([*plain_columns(moved, load_ratio).values()]))
+        rows.append(data.rows)
+        windows.append(data.window)
+    found, fit = list[int](), np.zeros(0)
+    left = _left(columns, torque, rows)[1] if angles else []
+    while left and len(found) < _MOST_WAVES:
+        order = _strongest(left, angles, found)
+        seen = structure(left, [np.mod(order * one, _TURN) for one in angles]) if order else None
+        if seen is None or seen.p * _ORDERS > _CHANCE:
             break
-        orders.append(order)
-        columns = [
-            np.column_stack([column, *(matched(wave(order * angle), one.window) for wave in (np.sin, np.cos))])
-            for column, angle, one in zip(columns, angles, data, strict=True)
+        more = [
+            np.column_stack([column, *(matched(wave(order * angle), window) for wave in (np.sin, np.cos))])
+            for column, angle, window in zip(columns, angles, windows, strict=True)
         ]
-    fit = _least_squares(columns, torque, rows)
-    pairs = fit[fit.size - 2 * len(orders) :].reshape(-1, 2)
-    waves = [TurnWave(order, float(np.hypot(*pair))) for order, pair in zip(orders, pairs, strict=True)]
+        again, rest = _left(more, torque, rows)
+        if _energy(rest) > (1.0 - _SHARE) * _energy(left):
+            break
+        found, columns, fit, left = [*found, order], more, again, rest
+    pairs = fit[fit.size - 2 * len(found) :].reshape(-1, 2)
+    waves = [TurnWave(order, float(np.hypot(*pair))) for order, pair in zip(found, pairs, strict=True)]
     return sorted(waves, key=lambda one: -one.amplitude)
 
 
-def _least_squares(columns: Sequence[FloatArray], torque: Sequence[FloatArray], rows: Sequence[Rows]) -> FloatArray:
-    """Coefficients (m,) of columns (n, m) for a torque (n,) of each part, in the rows that count."""
+def _first(parts: Sequence[tuple[FloatArray, FloatArray]]) -> list[tuple[FloatArray, FloatArray]]:
+    """The first rows of parts, as many as count."""
+    counted, free = list[tuple[FloatArray, FloatArray]](), _MOST_ROWS
+    for position, torque in parts:
+        if min(position.size, free) >= _FEWEST_ROWS:
+            counted.append((position[:free], torque[:free]))
+            free -= counted[-1][0].size
+    return counted
+
+
+def _left(
+    columns: Sequence[FloatArray], torque: Sequence[FloatArray], rows: Sequence[Rows]
+) -> tuple[FloatArray, list[ResidualSeries]]:
+    """Coefficients (m,) of columns (n, m) for torques (n,), in the rows that count, and what they leave."""
     kept = np.concatenate([column[at] for column, at in zip(columns, rows, strict=True)])
-    left = np.concatenate([one[at] for one, at in zip(torque, rows, strict=True)])
-    return np.asarray(np.linalg.lstsq(kept, left, rcond=None)[0])
+    fit = np.linalg.lstsq(kept, np.concatenate([one[at] for one, at in zip(torque, rows, strict=True)]), rcond=None)[0]
+    return fit, [ResidualSeries(one - column @ fit, at) for one, column, at in zip(torque, columns, rows, strict=True)]
 
 
 def _energy(series: Sequence[ResidualSeries]) -> float:
@@ -74,7 +99,7 @@ def _energy(series: Sequence[ResidualSeries]) -> float:
 
 
 def _strongest(series: Sequence[ResidualSeries], angles: Sequence[FloatArray], known: Sequence[int]) -> int:
-    """The strongest order of the means over steps of a turn, beside the known ones; 0 without whole turns."""
+    """The strongest order of the means over steps of a turn, beside the known ones; 0 without a whole turn."""
     turned = np.concatenate([np.mod(angle[one.rows], _TURN) for one, angle in zip(series, angles, strict=True)])
     steps = (turned / _TURN * _STEPS).astype(int) % _STEPS
     rows = np.bincount(steps, minlength=_STEPS)

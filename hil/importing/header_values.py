@@ -57,15 +57,16 @@ _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycle
 _MOST_BITS = 40.0  # of an encoder
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
 _IN_SI = (Constant.TORQUE, Constant.FORCE, Constant.RATED_TORQUE, Constant.RATED_FORCE)  # where no unit is given
-
-
+# Units of a ratio to amperes or volts.
 _ELECTRIC = {"A": ("A", 1.0), "mA": ("A", 1e-3), "V": ("V", 1.0), "mV": ("V", 1e-3)}
-_CONSTANTS = {  # by the unit above and below
+_BY_RATIO = {
     ("N m", "A"): Constant.TORQUE,
     ("N", "A"): Constant.FORCE,
     ("N m", "V"): Constant.TORQUE_GAIN,
     ("N", "V"): Constant.FORCE_GAIN,
 }
+# Sensors, brakes and gains of a controller have such ratios too.
+_BY_WORDS = (Constant.TORQUE_GAIN, Constant.FORCE_GAIN)
 
 
 def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Constant, HeaderValue]:
@@ -194,7 +195,11 @@ def _constant(told: Statement, unit: str | None) -> tuple[bool, Constant, float]
                 continue
             if unit or si < 1.0:  # a sampling of 1000 is a rate
                 return True, Constant.RATE, 1.0 / si
-    if ratio and not any(re.search(rf"\b{other}\b", words) for other in lexicon().other_constants):
+    if (
+        ratio
+        and ratio[0] not in _BY_WORDS
+        and not any(re.search(rf"\b{other}\b", words) for other in lexicon().other_constants)
+    ):
         return False, *ratio
     return None
 
@@ -223,8 +228,8 @@ def _of_ratio(value: float, unit: str) -> tuple[Constant, float] | None:
     si, factor = UNITS.get(above or "", ("", 0.0))
     below_si, below_factor = UNITS.get(below or "", ("", 1.0))
     electric, prefix = _ELECTRIC.get(below or "", ("", 1.0))
-    if (si, electric) in _CONSTANTS:
-        return _CONSTANTS[si, electric], value * factor / prefix
+    if (si, electric) in _BY_RATIO:
+        return _BY_RATIO[si, electric], value * factor / prefix
     if above == "counts" and below == "rev":
         return Constant.COUNTS, value
     if above == "counts" and below_si == "m":

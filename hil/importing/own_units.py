@@ -1,8 +1,8 @@
 """Take numbers of an unknown unit as they are, so that their axis can be looked at before the unit is known.
 
 A motion in numbers of its own unit has the same effects at the same places; masses, friction and stiffness are
-multiples, as if one of the numbers were the SI unit of its channel. So are those at the motor of a screw whose lead
-nobody tells.
+multiples, as if one of the numbers were the SI unit of its channel. Where nobody tells the lead of a screw, a usual one
+is taken, and values at the motor are multiples too.
 """
 
 from math import tau
@@ -20,7 +20,7 @@ _ONE = {
     "gain": 1.0,
 }
 _COUNTED = ("counts_per_rev", "counts_per_m")
-COUNT_AS = "its numbers count as"  # in the note on a channel of unknown size
+COUNT_AS = "its numbers count as"  # in the note on a channel or a lead of unknown size
 
 
 def take_own_units(draft: MapDraft) -> None:
@@ -29,10 +29,11 @@ def take_own_units(draft: MapDraft) -> None:
     without_column = {one.channel for one in draft.asked if one.key == "column"}
     left = list[Asked]()
     for one in draft.asked:
-        if one.key == "lead_m" and draft.lead_m is not None:
+        if one.key == "lead_m":
+            draft.lead_how = "taken, as nothing tells it"
             draft.unsure.append(
-                f"lead_m: {1e3 * draft.lead_m:g} mm per turn of the motor are taken, so that values at the motor and "
-                f"counts of turns are multiples; correct it: {one.what}"
+                f"lead_m: {COUNT_AS} turns of {1e3 * (draft.lead_m or 0.0):g} mm, so that values at the motor are "
+                f"multiples; correct it: {one.what}"
             )
             continue
         unit = CHANNELS[one.channel].unit if one.channel else ""

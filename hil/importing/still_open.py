@@ -19,6 +19,7 @@ def still_open(draft: MapDraft, text: str) -> list[str]:
     if not isinstance(now, dict) or not isinstance(now.get("channels"), dict):
         return []
     done = ["clock: "] if any(drafted.get(key) != now.get(key) for key in _CLOCK) else []
+    done += ["lead_m: "] if drafted.get("lead_m") != now.get("lead_m") else []
     for channel, entry in drafted["channels"].items():
         changed = now["channels"].get(channel)
         if changed != entry:

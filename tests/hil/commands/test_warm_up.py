@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 from command_line import hil
+from own_recordings import CLEAN
 
+from hil.commands import warm_up
 from hil.commands.warm_up import compile_kernels, kernels_are_compiled
 from hil.compiled.kernel_cache import provide_kernel_cache
 
@@ -36,19 +38,17 @@ def test_another_numba_python_or_processor_compiles_again(capsys: pytest.Capture
     assert capsys.readouterr().err == ""
 
 
-def test_kernels_of_the_loop_are_not_needed_to_explain(capsys: pytest.CaptureFixture[str]) -> None:
-    """A diagnosis compiles those of the twin alone; whoever has all has those, too."""
-    mark = provide_kernel_cache() / "compiled.txt"
-    now = mark.read_text()
-    mark.write_text("numba 0.1")
-    try:
-        compile_kernels(of_loop=False)
-        capsys.readouterr()
-        assert kernels_are_compiled(of_loop=False)
-        assert not kernels_are_compiled()
-    finally:
-        mark.write_text(now)
-    (mark.parent / "compiled-twin.txt").unlink()
+def test_kernels_of_the_loop_are_not_needed_to_explain(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A diagnosis asks for those of the twin alone; a loop then for the others; whoever has all has those, too."""
+    monkeypatch.setattr(warm_up, "_mark", tmp_path.joinpath)
+    compile_kernels(of_loop=False)
+    assert capsys.readouterr().err.splitlines() == [SAID.replace("about", "half")]
+    assert (kernels_are_compiled(of_loop=False), kernels_are_compiled()) == (True, False)
+    compile_kernels()
+    assert capsys.readouterr().err.splitlines() == [SAID]
+    (tmp_path / "compiled-twin.txt").unlink()
     assert kernels_are_compiled(of_loop=False)
 
 
@@ -84,3 +84,21 @@ def test_nothing_is_left_to_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     ):
         assert SAID not in command(*arguments).stderr
         assert {path.name for path in kernels() - compiled} == set(), arguments[0]
+
+
+@pytest.mark.long
+def test_a_diagnosis_adds_none_to_the_kernels_of_the_twin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in ("hil", "drivers"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    code = "from hil.commands.warm_up import compile_kernels; compile_kernels(of_loop=False)"
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
+    compiled = {path.name for path in (tmp_path / "kernels").rglob("*.nbc")}
+    for command in (
+        ("explain", str(CLEAN)),
+        ("identify", str(CLEAN)),
+        ("friction", str(CLEAN), "--bench", "reference"),
+    ):
+        arguments = [sys.executable, "-m", "hil.cli", *command, "--out", f"{command[0]}-out"]
+        subprocess.run(arguments, cwd=tmp_path, check=True, capture_output=True)
+        assert {path.name for path in (tmp_path / "kernels").rglob("*.nbc")} == compiled, command

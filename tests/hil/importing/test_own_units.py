@@ -12,6 +12,7 @@ from hil.importing.by_map import import_recording
 from hil.importing.draft_map import draft_map
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import take_own_units
+from hil.importing.still_open import still_open
 
 
 def imported(folder: Path, **names: str) -> tuple[dict[str, np.ndarray], list[str], list[str]]:
@@ -49,7 +50,18 @@ def test_without_a_lead_the_motor_is_told_in_multiples(tmp_path: Path) -> None:
     assert not asked
     travel = 1e-3 * axis()["x_act"]
     assert columns["motor_position_rad"] == pytest.approx(2.0 * np.pi * travel / 0.010, abs=1e-6)
-    assert any(note.startswith("lead_m: 10 mm per turn of the motor are taken") for note in notes)
+    assert any(note.startswith("lead_m: its numbers count as turns of 10 mm") for note in notes)
+
+
+def test_a_lead_that_is_corrected_is_no_doubt(tmp_path: Path) -> None:
+    draft = draft_map(write(tmp_path / "axis.csv", renamed(axis(), t="t", x_act="x_act_mm", torque="torque_Nm")))
+    take_own_units(draft)
+    text = map_text(draft)
+    assert "0.01   # m per revolution of the motor; taken, as nothing tells it" in text
+    assert any(note.startswith("lead_m: ") for note in still_open(draft, text))
+    assert not any(
+        note.startswith("lead_m: ") for note in still_open(draft, text.replace("lead_m: 0.01 ", "lead_m: 0.005 "))
+    )
 
 
 def test_a_value_beside_its_question_answers_it() -> None:

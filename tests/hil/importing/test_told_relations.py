@@ -131,7 +131,7 @@ def test_steps_beside_a_linear_scale_tell_all_but_the_lead(tmp_path: Path) -> No
     source.write_text(csv_text({"t_s": T, "Sollschritte": STEPS, "Massstab [mm]": scale}))
     draft = draft_map(source)
     take_own_units(draft)
-    assert any("lead_m: 10 mm per turn of the motor are taken" in note for note in draft.unsure)
+    assert any("lead_m: its numbers count as turns of 10 mm" in note for note in draft.unsure)
     path = tmp_path / "map.yaml"
     path.write_text(re.sub(r"^lead_m:.*", "lead_m: 0.005", map_text(draft), flags=re.MULTILINE))
     look = first_look([import_recording(source, path)])

@@ -160,14 +160,14 @@ def test_the_rate_of_a_first_run_is_read_from_the_map(tmp_path: Path) -> None:
 
 
 def test_a_question_comes_with_what_else_was_assumed(tmp_path: Path) -> None:
-    """A clock of unknown unit, and a length whose lead nothing tells."""
-    columns = axis(2500)
-    rows = np.column_stack([10 * np.arange(2500), 10.0 * columns["angle"], columns["torque"]])
-    np.savetxt(tmp_path / "axis.csv", rows, delimiter=",", header="tick,len_mm,trq_nm", comments="", fmt="%.9g")
+    """A clock of unknown unit, and no column that the motion explains as a torque."""
+    other = np.random.default_rng(1).normal(0.0, 1.0, (2500, 2))
+    rows = np.column_stack([10 * np.arange(2500), axis(2500)["angle"], other])
+    np.savetxt(tmp_path / "axis.csv", rows, delimiter=",", header="tick,angle_rad,a1,a2", comments="", fmt="%.9g")
     ran = hil(tmp_path, "explain", "axis.csv")
     assert ran.returncode == 2
     told = " ".join(ran.stderr.split())
-    assert "lead_m: len_mm is a length" in told
+    assert "no column is known to be the torque, force, current or voltage" in told
     assert "clock: the unit of 'tick' is not given; ms is taken" in told
 
 

@@ -62,13 +62,8 @@ class Basis:
 
     @property
     def unsized(self) -> dict[str, list[str]]:
-        """Channels of each map whose size nothing tells, so that their values are multiples."""
-        found: dict[str, list[str]] = {}
-        for note, mark, _ in (one.partition(f": {COUNT_AS}") for one in self.assumed):
-            path, _, channel = note.rpartition(": ")
-            if mark:
-                found.setdefault(path, []).append(channel)
-        return found
+        """Channels of each map whose size nothing tells, or its lead, so that their values are multiples."""
+        return _unsized(self.assumed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +142,8 @@ def explain(
         how = join_logs(paths, joined, any(_is_whole(one, told) for one in paths))
         read, assumed = _recordings([joined], folder, told._replace(rate_hz=None), progress)
         assumed = [how, *assumed]
-    look(first_look(read, turns_told=not any(COUNT_AS in one and "torque" not in one for one in assumed)))
+    unsized = [channel for channels in _unsized(assumed).values() for channel in channels]
+    look(first_look(read, turns_told=not any(one.startswith(("lead", "motor")) for one in unsized)))
     progress("taking the bench, or drafting it")
     bench, draft, notes = _bench(read, folder / BENCH)
     warnings = [one for one in notes if OUTDATED in one]
@@ -163,6 +159,15 @@ def explain(
         path = folder / BENCH
         write_diagnosis(diagnosis, part, basis.assumed, path if is_file(path) else None)
     return Explanation(basis, diagnosis, folder)
+
+
+def _unsized(assumed: Sequence[str]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for note, mark, _ in (one.partition(f": {COUNT_AS}") for one in assumed):
+        path, _, channel = note.rpartition(": ")
+        if mark:
+            found.setdefault(path, []).append(channel)
+    return found
 
 
 def _recordings(

@@ -18,8 +18,6 @@ OBSERVER_S = 0.008
 # Least time constant of any observer in ticks: the sampled error of a rigid body decays by 3/4 per tick with 2, grows
 # with 1.
 LEAST_TICKS = 2.0
-# The same of a table that its own encoder holds: with 2 it would have all the noise of the last reading.
-HELD_TICKS = 4.0
 # Time constant with which the replayed integrator follows the recorded command: slow against every filter or delay.
 INTEGRATOR_S = 0.1
 
@@ -81,7 +79,7 @@ def closed_loop(gains, state, setpoints, misread, measured_table, push, axis):  
         command[k] = outputs.torque_n_m
         if told > 0 and own.floating > 0.0:
             error = (measured_table[k] - datum - table[k]) / c.ratio
-            _correct(shapes.table_impulse, error, c.period, max(OBSERVER_S, HELD_TICKS * c.period), delta)
+            _correct(shapes.table_impulse, error, c.period, max(OBSERVER_S, LEAST_TICKS * c.period), delta)
         if push.size:
             own.push = push[k]
         torque[k] = _advance(command[k], constants, modes, values, codes, delta, memory)
@@ -140,7 +138,7 @@ def observe(gains, state, setpoints, measured, resting, push, axis):  # type: ig
     motor, table, wanted, torque = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seen = measured_motor * c.ratio if measured_table.size == 0 else measured_table
     datum, settled, moved = 0.0, 0, 0
-    hold = max(OBSERVER_S, HELD_TICKS * c.period)
+    hold = max(OBSERVER_S, LEAST_TICKS * c.period)
     for k in range(n):
         motor[k], table[k] = _read(constants, modes, values, codes, delta, memory)
         inputs = _inputs(setpoints, k, measured_motor[k], seen[k])

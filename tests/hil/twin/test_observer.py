@@ -9,7 +9,6 @@ import pytest
 
 from hil.bench.bench_file import load_bench
 from hil.twin.axis import Response, Twin
-from hil.twin.physics import Active
 from hil.twin.stepping.loops import LEAST_TICKS
 
 
@@ -86,19 +85,3 @@ def test_a_mode_that_the_ticks_do_not_show_is_not_excited(turns: float) -> None:
     rigid = 0.2 * physics.coulomb_n_m * twin.observer_s**2 / inertia
     error = np.abs(true.motor_position - found.motor_position)
     assert np.max(error) < 2.0 * rigid
-
-
-@pytest.mark.parametrize("period_s", [0.001, 0.005, 0.01])
-def test_a_table_at_rest_in_a_gap_has_little_of_the_noise_of_its_encoder(period_s: float) -> None:
-    """Its place is known from many readings: put to each last one, it would be off by the noise of two."""
-    bench, rows, noise_m = load_bench("reference"), 2000, 1e-6
-    twin = Twin(
-        bench.axis.physics(),
-        bench.gains._replace(period_s=period_s),
-        active=(Active("backlash", (30e-6,), 0),),
-        observer_s=LEAST_TICKS * period_s,
-    )
-    still = np.zeros(rows)
-    read = np.random.default_rng(4).normal(0.0, noise_m, rows)
-    found = twin.observe(still, still, Response(still, read, still, still), resting=np.ones(rows, dtype=bool))
-    assert np.std((read - found.table_position_m)[100:]) < 1.25 * noise_m

@@ -69,7 +69,7 @@ def _plain(told: PlantTold, recording: Recording) -> list[str]:
 
 
 def _over_turn(parts: Sequence[Recording], told: PlantTold) -> list[str]:
-    """What of the torque repeats with each turn of the motor; nothing without a torque of a motor that turns."""
+    """One line with the waves of the torque over a turn; none for a linear motor, or without a torque."""
     names, early = parts[0].axis, told.plant.early_s
     if parts[0].kind is AxisKind.LINEAR or names.torque not in parts[0].columns:
         return []

@@ -6,7 +6,6 @@ is that of the Lomb-Scargle periodogram with a free mean (M. Zechmeister, M. Kue
 """
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from hil.arrays import FloatArray
 from hil.identification.least_squares import least_squares
@@ -27,6 +26,8 @@ def refined_period(position: FloatArray, signal: FloatArray, period: float, shor
     Sought within half the width of its peak in the spectrum, and between the shortest and the longest period. What
     varies over more than the longest is taken off first.
     """
+    from scipy.optimize import minimize_scalar  # a first look needs no optimiser
+
     span = float(np.ptp(position))
     width = 0.5 / span
     quick = signal - _slow(position, signal, longest) if longest < span else signal

@@ -6,6 +6,7 @@ Rows of a standstill count: a motor that is held at one place after another tell
 """
 
 from collections.abc import Sequence
+from math import tau
 from typing import NamedTuple
 
 import numpy as np
@@ -13,15 +14,14 @@ from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
 from hil.identification.derivatives import later_motion, matched
+from hil.identification.periods import strongest_periods
 from hil.identification.plain_model import motion_data, plain_columns
 from hil.identification.structure import ResidualSeries, structure
 
 Rows = NDArray[np.bool_]
-_TURN = 2.0 * np.pi
-_STEPS = 720  # of a turn
-_ORDERS = _STEPS // 4  # highest order: four steps in a wave
-_MET = 0.9  # share of the steps of a turn that the motor passes
-_CHANCE = 0.01  # by which any of all orders may seem to be there
+_ORDERS = 180  # the highest: a wave of two degrees
+_PASSED = 0.9  # of a turn: less tells no order of one
+_CHANCE = 0.01  # of the look: by chance alone, one recording in a hundred shows a wave
 _SHARE = 0.1  # of the energy that the plain model and stronger waves leave: the least that a wave explains
 _MOST_WAVES, _MOST_ROWS, _FEWEST_ROWS = 4, 100_000, 100
 
@@ -39,9 +39,9 @@ def turn_waves(
     early_s: float = 0.0,
     load_ratio: float | None = None,
 ) -> list[TurnWave]:
-    """The strongest waves of parts (position [rad], torque), each (n,), at most four; largest first.
+    """The strongest waves of parts (position [rad], torque), each (n,), that both halves have; at most four.
 
-    The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of a load that turns: its
+    The largest comes first. The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of a load that turns: its
     gravity is no wave. Empty where the motor passes less than nine tenths of a turn, or for few rows; of many rows the
     first count.
     """
@@ -58,8 +58,8 @@ def turn_waves(
     found, fit = list[int](), np.zeros(0)
     left = _left(columns, torque, rows)[1] if angles else []
     while left and len(found) < _MOST_WAVES:
-        order = _strongest(left, angles, found)
-        seen = structure(left, [np.mod(order * one, _TURN) for one in angles]) if order else None
+        order = _strongest(left, angles)
+        seen = structure(left, [np.mod(order * one, tau) for one in angles]) if order and order not in found else None
         if seen is None or seen.p * _ORDERS > _CHANCE:
             break
         more = [
@@ -67,12 +67,12 @@ def turn_waves(
             for column, angle, window in zip(columns, angles, windows, strict=True)
         ]
         again, rest = _left(more, torque, rows)
-        if _energy(rest) > (1.0 - _SHARE) * _energy(left):
+        if _energy(rest) > (1.0 - _SHARE) * _energy(left) or not _repeats(again, more, torque, rows):
             break
         found, columns, fit, left = [*found, order], more, again, rest
     pairs = fit[fit.size - 2 * len(found) :].reshape(-1, 2)
-    waves = [TurnWave(order, float(np.hypot(*pair))) for order, pair in zip(found, pairs, strict=True)]
-    return sorted(waves, key=lambda one: -one.amplitude)
+    told = [TurnWave(order, float(np.hypot(*pair))) for order, pair in zip(found, pairs, strict=True)]
+    return sorted(told, key=lambda one: -one.amplitude)
 
 
 def _first(parts: Sequence[tuple[FloatArray, FloatArray]]) -> list[tuple[FloatArray, FloatArray]]:
@@ -98,16 +98,25 @@ def _energy(series: Sequence[ResidualSeries]) -> float:
     return float(np.mean(np.concatenate([one.left[one.rows] for one in series]) ** 2))
 
 
-def _strongest(series: Sequence[ResidualSeries], angles: Sequence[FloatArray], known: Sequence[int]) -> int:
-    """The strongest order of the means over steps of a turn, beside the known ones; 0 without a whole turn."""
-    turned = np.concatenate([np.mod(angle[one.rows], _TURN) for one, angle in zip(series, angles, strict=True)])
-    steps = (turned / _TURN * _STEPS).astype(int) % _STEPS
-    rows = np.bincount(steps, minlength=_STEPS)
-    met = rows > 0
-    if np.mean(met) < _MET:
+def _repeats(
+    fit: FloatArray, columns: Sequence[FloatArray], torque: Sequence[FloatArray], rows: Sequence[Rows]
+) -> bool:
+    """True if both halves of the rows have the last wave: nearer to that of all rows than to none."""
+    halves = [[np.cumsum(at) <= at.sum() // 2 for at in rows], [np.cumsum(at) > at.sum() // 2 for at in rows]]
+    return all(
+        np.linalg.norm(
+            _left(columns, torque, [at & one for at, one in zip(rows, half, strict=True)])[0][-2:] - fit[-2:]
+        )
+        < 0.5 * np.linalg.norm(fit[-2:])
+        for half in halves
+    )
+
+
+def _strongest(series: Sequence[ResidualSeries], angles: Sequence[FloatArray]) -> int:
+    """The strongest order of what is left over the angle of a turn; 0 without a whole turn."""
+    if max(float(np.ptp(one)) for one in angles) < _PASSED * tau:
         return 0
-    sums = np.bincount(steps, np.concatenate([one.left[one.rows] for one in series]), _STEPS)
-    means = np.interp(np.arange(_STEPS), np.flatnonzero(met), sums[met] / rows[met], period=_STEPS)
-    strength = np.abs(np.fft.rfft(means))[: _ORDERS + 1]
-    strength[[0, *known]] = 0.0
-    return int(np.argmax(strength))
+    turned = np.concatenate([np.mod(angle[one.rows], tau) for one, angle in zip(series, angles, strict=True)])
+    left = np.concatenate([one.left[one.rows] for one in series])
+    found = strongest_periods(turned, left, tau / (4 * _ORDERS), tau / _ORDERS, most=1)
+    return round(tau / found[0]) if found else 0

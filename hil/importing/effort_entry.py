@@ -98,13 +98,12 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
             of = f"of the rated or the largest {whole}, as the drive has it"
             entry.asked["rated"] = f"is in {unit} {of}; write the {si} at 100 % {_UNKNOWN}{screw}"
         return entry
-    per_unit = {
-        "A": Constant.FORCE if linear else Constant.TORQUE,
-        "V": Constant.FORCE_GAIN if linear else Constant.TORQUE_GAIN,
-    }
-    header = constants.get(per_unit[unit]) if unit in per_unit else None
+    size, per_unit = "gain", Constant.FORCE_GAIN if linear else Constant.TORQUE_GAIN
+    if unit == "A":
+        size, per_unit = key, Constant.FORCE if linear else Constant.TORQUE
+    header = constants.get(per_unit) if unit in ("A", "V") else None
     if header is not None:
-        entry.keys[key if unit == "A" else "gain"] = header.value
+        entry.keys[size] = header.value
         entry.notes.append(f"{column}: its constant is taken from the header of the file: {header.text}")
         return entry
     positive = [name for name, value in table.scalars.items() if 0.0 < value < np.inf]
@@ -127,7 +126,7 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         if not is_joint_state(told):
             entry.asked["unit"] = effort_unit(kind)
         return entry
-    entry.keys[key if unit == "A" else "gain"] = 1.0
+    entry.keys[size] = 1.0
     if told.electric == "V":  # of the motor, which a bench in volts drives, and no output that stands for a torque
         entry.notes.append(
             f"{column}: the {si} per V are not known, 1 is taken: masses and friction are in multiples of it"
@@ -141,7 +140,7 @@ def _entry(told: Label, kind: AxisKind, table: ForeignTable) -> EffortEntry:
         if unit == "A"
         else f"the size of its scale, if it is an output of {'force' if linear else 'torque'},"
     )
-    entry.asked[key if unit == "A" else "gain"] = f"is in {unit}{given}; write {what} in {si}/{unit} {_UNKNOWN}{screw}"
+    entry.asked[size] = f"is in {unit}{given}; write {what} in {si}/{unit} {_UNKNOWN}{screw}"
     return entry
 
 

@@ -1,8 +1,8 @@
 """Take numbers of an unknown unit as they are, so that their axis can be looked at before the unit is known.
 
 A motion in numbers of its own unit has the same effects at the same places; masses, friction and stiffness are
-multiples, as if one of the numbers were the SI unit of its channel. Where nobody tells the lead of a screw, a usual one
-is taken, and values at the motor are multiples too.
+multiples, as if one of the numbers were the SI unit of its channel. If nothing tells the lead of a screw, 10 mm are
+taken, and values at the motor are multiples too.
 """
 
 from math import tau

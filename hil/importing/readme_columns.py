@@ -40,7 +40,7 @@ class ToldColumn(NamedTuple):
 
 
 def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldColumn]:
-    """What `lines` tell about the columns `names`: in a list, or in a sentence where a list tells fewer than two units.
+    """What `lines` say of the columns `names`: a list of them; sentences, if the list gives fewer than two units.
 
     A line that begins with a name goes before one in which it stands, a unit before the size of a count.
     """

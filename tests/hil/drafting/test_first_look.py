@@ -42,7 +42,7 @@ def test_what_cannot_be_told_is_said_with_its_reason() -> None:
 
 @pytest.mark.parametrize("load_turns", [False, True])
 def test_cogging_is_told_and_gravity_is_none(load_turns: bool) -> None:
-    """Of an arm on its motor the weight is part of the plain model; an unknown size of the turn tells no wave."""
+    """The plain model has the gravity of an arm. If the angle of a turn is not known, no wave is told."""
     rng, time = np.random.default_rng(2), 1e-3 * np.arange(20_000)
     angle = 9.0 * (1.0 - np.cos(1.1 * time)) + 0.4 * np.sin(8.0 * time)
     speed, acceleration = 9.9 * np.sin(1.1 * time) + 3.2 * np.cos(8.0 * time), np.zeros(time.size)

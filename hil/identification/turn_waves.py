@@ -41,9 +41,9 @@ def turn_waves(
 ) -> list[TurnWave]:
     """The strongest waves of parts (position [rad], torque), each (n,), that both halves have; at most four.
 
-    The largest comes first. The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of a load that turns: its
-    gravity is no wave. Empty where the motor passes less than nine tenths of a turn, or for few rows; of many rows the
-    first count.
+    The largest comes first. The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of
+    a load that turns: its gravity is no wave. Empty where the motor passes less than nine tenths of a turn, or for few
+    rows; of many rows the first count.
     """
     angles, torque, columns, rows, windows = [], [], [], [], []
     for position, given in _first(parts):

@@ -41,7 +41,7 @@ def turn_waves(
 ) -> list[TurnWave]:
     """The strongest waves of parts (position [rad], torque), each (n,), that both halves have; at most four.
 
-    The largest comes first. The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of
+    Largest first. The torque is recorded `early_s` before its motion. `load_ratio` [load rad per motor rad] of
     a load that turns: its gravity is no wave. Empty where the motor passes less than nine tenths of a turn, or for few
     rows; of many rows the first count.
     """

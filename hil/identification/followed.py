@@ -4,24 +4,25 @@
 
 A torque that is measured with noise would drive the twin's motor, and the lighter the motor the farther: the noise of
 the torque would then be in what the second encoder reads of the twin. Here the motor follows its measured motion: it is
-so heavy that neither spring nor friction moves it, and gets the torque of its measured acceleration. The observer
-corrects what is faster than that acceleration's mean. A coarse encoder would drive a resonance with its counts: there
-the torque tells the motion better (`hil.identification.residual_scales.follows`).
+so heavy that neither spring nor friction moves it, and gets the torque of a cubic spline through the measured
+positions, also between rows that are far apart. A coarse encoder would drive a resonance with its counts: there the
+torque tells the motion better (`hil.identification.residual_scales.follows`).
 """
 
+import math
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from hil.arrays import FloatArray
-from hil.identification.derivatives import matched_motion
 from hil.identification.measured import Measured
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
-from hil.identification.windows import shortest_window
+from hil.twin.axis import Response, Twin
 from hil.twin.mechanism import Moment, Stage
 from hil.twin.physics import Active
 from hil.twin.structure.chain import Chain
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 _TORQUE = (Stage.CURRENT, Stage.TORQUE, Stage.MOTOR_TORQUE)
 _MEMORY = 64  # values that a friction may remember, at most
 _HEAVIER = 1e3  # motor over the axis: the spring moves it by a thousandth, which the observer takes back
+_LONGEST_TICK_S = 2e-3  # of a twin that follows the motor: short against a mode up to 100 Hz
+_LONGER = 2  # internal steps of such ticks, at most: as those of a row of 4 ms
 _MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
 
 
@@ -48,15 +51,43 @@ def behind_motor(
     twin = hypothesis.twin(observer_s, fast, run)
     measured, rest = hypothesis.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
     chain = _with_heavy_motor(twin.physics.chain)
-    acceleration = matched_motion(measured.motor_position, run.period_s, _window(run)).acceleration
-    torque = float(chain.inertia_kg_m2.sum()) * acceleration
     active = tuple(one for one in twin.active if not _by_torque(one))
     heavy = replace(twin, physics=replace(twin.physics, chain=chain), active=active)
-    inputs = measured._replace(torque_command=torque, torque=torque)
-    predicted = heavy.observe(
-        run.position_command_m, run.velocity_command_m_s, inputs, run.start, rest, run.feedforward
-    )
+    table = _moved(heavy, measured, run, rest)
+    predicted = measured._replace(table_position_m=table)
     return {"table": differences(measured, predicted, hypothesis.bench, run.evaluated)["table"]}
+
+
+def _moved(heavy: Twin, measured: Response, run: Measured, rest: NDArray[np.bool_]) -> FloatArray:
+    """Second encoder (n,) of a twin whose heavy motor moves along a cubic spline through its measured positions.
+
+    Torque and friction are held from tick to tick: ticks are short, however long a row is.
+    """
+    parts = max(math.ceil(run.period_s / _LONGEST_TICK_S - 1e-6), 1)
+    rows, period_s = np.arange(run.motor.size), run.period_s / parts
+    ticks = np.arange(run.motor.size * parts + 1) / parts
+    path = CubicSpline(rows, measured.motor_position)
+    speed = path(ticks, 1) / run.period_s
+    torque = float(heavy.physics.chain.inertia_kg_m2.sum()) * np.diff(speed) / period_s
+    table = np.interp(ticks[:-1], rows, measured.table_position_m)
+    longer = min(parts, _LONGER)
+    finer = replace(
+        heavy,
+        gains=heavy.gains._replace(period_s=period_s),
+        observer_s=heavy.observer_s / parts,
+        push_n=np.repeat(heavy.push_n, parts),
+        coarse_step_s=longer * heavy.coarse_step_s,
+        fine_step_s=longer * heavy.fine_step_s,
+    )
+    moved = finer.observe(
+        np.repeat(run.position_command_m, parts),
+        np.repeat(run.velocity_command_m_s, parts),
+        Response(path(ticks[:-1]), table, torque, torque),
+        run.start,
+        np.repeat(rest, parts),
+        np.repeat(run.feedforward, parts),
+    )
+    return moved.table_position_m[::parts]
 
 
 def _by_torque(active: Active) -> bool:
@@ -75,11 +106,6 @@ def second_encoder(hypothesis: "Hypothesis", run: Measured, observer_s: float, f
         return {}
     behind = behind_motor(hypothesis, run, observer_s, fast)
     return behind or {"table": hypothesis.driven(run, observer_s, fast)["table"]}
-
-
-@lru_cache(maxsize=32)
-def _window(run: Measured) -> int:
-    return shortest_window(run.motor, run.period_s)
 
 
 def _with_heavy_motor(chain: Chain) -> Chain:

@@ -153,15 +153,16 @@ def _screw(what: str) -> str:
 
 
 def _rated(told: Label, linear: bool, table: ForeignTable) -> tuple[float, str]:
-    """Rated torque or force of a column in %, with the text that gives it; 1 without one."""
+    """Torque or force at 100 % of a column, with the text that gives it; 1 without one.
+
+    The rated one, or that of the rated current, which goes first for a current.
+    """
     constants = table.constants
     rated = constants.get(Constant.RATED_FORCE if linear else Constant.RATED_TORQUE)
     current, constant = (
         constants.get(Constant.RATED_CURRENT),
         constants.get(Constant.FORCE if linear else Constant.TORQUE),
     )
-    if told.electric == "A":
-        return (
-            (current.value * constant.value, f"{current.text}, {constant.text}") if current and constant else (1.0, "")
-        )
-    return (rated.value, rated.text) if rated else (1.0, "")
+    if current and constant and (told.electric == "A" or rated is None):
+        return current.value * constant.value, f"{current.text}, {constant.text}"
+    return (rated.value, rated.text) if rated and told.electric != "A" else (1.0, "")

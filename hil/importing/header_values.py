@@ -37,7 +37,12 @@ _SIGNS = re.compile(r"[\s·・*.\"']+")  # between the parts of a unit
 _TEXT_OF_NAME = re.compile(r"[^\w/]+|_")
 _PER = re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
-_WHOLE_IS = re.compile(r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*([\d.,]+)\s*([a-z][a-z·* ]*)")
+_WHOLE_IS = re.compile(  # 100 % = 28 N m, or 28 N m (= 100 %)
+    r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*(?P<size>\d[\d.,]*)\s*(?P<unit>[a-z][a-z·* ]*)"
+    r"|(?P<before>\d[\d.,]*)\s*(?P<its>[a-z][a-z·* ]*?)\s*[(\[]?\s*(?:=|is|equals|corresponds to|entspricht)\s*100\s*%"
+)
+_RATED = ("rated torque", "rated force", "rated current")
+_EQUALS = re.compile(r"\s*=\s*")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
 # behind a number: 32 mm [of strip, ram feed] per motor revolution; 10 mm pitch directly coupled, 4 mm lead, ...
 _PER_MOTOR_TURN = re.compile(
@@ -97,17 +102,17 @@ def _statements(line: str) -> Iterator[Statement]:
         size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
         yield from [Statement("", size, (unit,), line.strip())] if size is not None else []
         return
-    if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole[1])) is not None:
-        units = tuple(_units_behind(whole[2]))
-        yield from (Statement(words, size, units, header_text(line)) for words in ("rated torque", "rated force"))
+    if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole["size"] or whole["before"])) is not None:
+        units = tuple(_units_behind(whole["unit"] or whole["its"]))
+        yield from (Statement(words, size, units, header_text(line)) for words in _RATED)
         return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
         before = folded[matches[index - 1].end() if index else 0 : match.start()]
         end = matches[index + 1].start() if index + 1 < len(matches) else len(folded)
         value, behind = _number(match[0]), folded[match.end() : end]
-        if value is None or _is_list(folded, matches[index:], value):
-            continue
+        if value is None or _EQUALS.fullmatch(behind) or _is_list(folded, matches[index:], value):
+            continue  # 1000 = 3.2 Nm: a number of the file
         if not _THOUSANDS.fullmatch(match[0]):
             yield from told_behind(before, value, behind, header_text(line))
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):

@@ -50,8 +50,10 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     encoding = encoding_of(raw)
     lines = [line.decode(encoding) for line in raw]
     titles = {table.titles.get(name, name): name for name in table.columns}
+    titles = _last_words(titles) | titles
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
-    told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
+    found = told_columns(lines, list(titles)) | listed
+    told = {titles[title]: found[title] for title in titles if title in found}
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
     if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
@@ -64,6 +66,13 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
         words={name: one.words for name, one in told.items() if one.words} | table.words,
         constants=constants | table.constants,
     )
+
+
+def _last_words(titles: Mapping[str, str]) -> dict[str, str]:
+    """Columns by the last part of a title with points, if one has it: enc of log.enc, as its owner calls it."""
+    last = [(title.rpartition(".")[2], name) for title, name in titles.items() if "." in title]
+    parts = [part for part, _ in last]
+    return {part: name for part, name in last if parts.count(part) == 1 and part not in titles}
 
 
 def _motor_encoder(told: Mapping[str, ToldColumn]) -> str:

@@ -18,6 +18,7 @@ _BEHIND_NAME = r"(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|\t\s*|\s*(?=[\[(]))"
 _NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)(.*)")
 _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
+_EQUAL = re.compile(r"(?:^|\s)(\d+(?:[.,]\d+)*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)$")
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
 _PER_TURN = re.compile(  # 65536 counts per motor turn
@@ -114,6 +115,8 @@ def _of_both(text: str) -> ToldColumn | None:
 def _told(text: str) -> ToldColumn:
     """Words, unit and step of what is said of a column. A plain unit goes before the size of a count."""
     phrases = _phrases(text)
+    if equal := next(filter(None, map(_equal, phrases)), None):
+        return ToldColumn(phrases[0], equal[1], equal[0])
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
     words = phrases[0] if phrases and phrases[0] != unit else ""
     counts = unit_named(unit) == "counts"
@@ -124,6 +127,16 @@ def _told(text: str) -> ToldColumn:
         return ToldColumn(words, unit or "counts", per_turn=per_turn)
     steps = (step for part in phrases if (step := _step(part, counts)))
     return next((ToldColumn(words, of_step, size) for size, of_step in steps), ToldColumn(words, unit))
+
+
+def _equal(phrase: str) -> tuple[float, str] | None:
+    """Size and unit of a count or a volt, told by an equation: 1000 = 3.2 Nm, 10 V = 3 N m, 1 count = 2 um."""
+    match = _EQUAL.search(phrase)
+    whole, own, size, unit = match.groups() if match else ("", "", "", "")
+    if not (match and _is_unit(unit) and (not own or unit_named(own) in ("counts", "V"))):
+        return None
+    many = float(re.sub(r",(?=\d{3})", "", whole))
+    return (float(size.replace(",", ".")) / many, unit) if many else None
 
 
 def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:

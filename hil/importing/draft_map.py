@@ -178,8 +178,9 @@ def _list_the_rest(draft: MapDraft, given: Mapping[str, FloatArray], times: Coll
 
 def labels_of(table: ForeignTable) -> dict[str, Label]:
     """Meaning of the columns by all that the file says of them."""
-    units = table.units | table.cell_units
-    told = {name: (units.get(name, ""), table.words.get(name, ""), name in table.cell_units) for name in table.columns}
+    firm = table.cell_units | table.firm_units
+    units = table.units | firm
+    told = {name: (units.get(name, ""), table.words.get(name, ""), name in firm) for name in table.columns}
     labels = {name: replace(label(table.titles.get(name, name), *of), column=name) for name, of in told.items()}
     # no axis moves hundreds of metres in whole ones: enc_m is the motor's encoder
     metres = [name for name, one in labels.items() if one.unit == "m" and are_counts(table.columns[name])]

@@ -44,7 +44,8 @@ class ForeignTable:
     `constants` are what lines above the numbers, or scalars, give by a name that is known. `dates` are columns of dates
     or times of day, in seconds; `texts` is the first text among the numbers of a column, `words` what lines above say
     of it, `titles` its text in the file where the column has another name. `scales` are factor and offset that the file
-    gives for a column, `periods_s` the periods of its rows, `cell_units` the units of columns whose cells hold theirs.
+    gives for a column, `periods_s` the periods of its rows, `cell_units` the units of columns whose cells hold theirs,
+    `firm_units` those that go before the unit of a name.
     `notes` tell the user what was left out or assumed; `lines` (n,) are the line numbers of the rows in the file.
     """
 
@@ -64,6 +65,7 @@ class ForeignTable:
     notes: tuple[str, ...] = ()
     lines: NDArray[np.int64] | None = None
     cell_units: dict[str, str] = field(default_factory=dict)
+    firm_units: dict[str, str] = field(default_factory=dict)
 
     def place(self, row: int) -> str:
         """Place of a row (from 0) of the numbers in the file."""

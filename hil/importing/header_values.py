@@ -42,7 +42,7 @@ _WHOLE_IS = re.compile(  # 100 % = 28 N m, or 28 N m (= 100 %)
     r"|(?P<before>\d[\d.,]*)\s*(?P<its>[a-z][a-z·* ]*?)\s*[(\[]?\s*(?:=|is|equals|corresponds to|entspricht)\s*100\s*%"
 )
 _RATED = ("rated torque", "rated force", "rated current")
-_EQUALS = re.compile(r"\s*=\s*")
+_EQUALS, _RESTATED = re.compile(r"\s*=\s*"), re.compile(r"[(\[]\s*=\s*$")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
 # behind a number: 32 mm [of strip, ram feed] per motor revolution; 10 mm pitch directly coupled, 4 mm lead, ...
 _PER_MOTOR_TURN = re.compile(
@@ -111,8 +111,10 @@ def _statements(line: str) -> Iterator[Statement]:
         before = folded[matches[index - 1].end() if index else 0 : match.start()]
         end = matches[index + 1].start() if index + 1 < len(matches) else len(folded)
         value, behind = _number(match[0]), folded[match.end() : end]
-        if value is None or _EQUALS.fullmatch(behind) or _is_list(folded, matches[index:], value):
-            continue  # 1000 = 3.2 Nm: a number of the file
+        if value is None or _is_list(folded, matches[index:], value):
+            continue
+        if _EQUALS.fullmatch(behind) or _RESTATED.search(before):  # 1000 = 3.2 Nm; 1.6e-4 kg m2 (= 1.6 at the joint)
+            continue
         if not _THOUSANDS.fullmatch(match[0]):
             yield from told_behind(before, value, behind, header_text(line))
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
@@ -132,7 +134,8 @@ def _words_before(before: str, value: float, behind: str, line: str) -> Statemen
     words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
     if unit and not any(units_behind) and not bracket:
         words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
-    sentence = _plain(_SENTENCES.split(told)[-1])
+    # a sentence does not begin with its number: the point before it is that of a short word
+    sentence = next(filter(None, map(_plain, reversed(_SENTENCES.split(told)))), "")
     return Statement(words, value, (*units, *units_behind), line, phrase, sentence)
 
 

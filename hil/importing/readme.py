@@ -63,6 +63,7 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
         table,
         units={name: one.unit for name, one in told.items() if one.unit} | table.units,
         scales={name: (step, 0.0) for name, step in steps.items()} | table.scales,
+        firm_units={name: one.unit for name, one in told.items() if _is_angle(one)},
         words={name: one.words for name, one in told.items() if one.words} | table.words,
         constants=constants | table.constants,
     )
@@ -85,6 +86,11 @@ def _as_angle(name: str, told: ToldColumn) -> ToldColumn:
     """A column of another encoder, with counts per turn of its own, as an angle; a set-point is in those of a drive."""
     own = told.per_turn and not label(name, "", told.words).command
     return told._replace(unit="deg", step=360.0 / told.per_turn) if own and told.per_turn else told
+
+
+def _is_angle(told: ToldColumn) -> bool:
+    """True for counts that a README makes an angle, though the name of the column says counts."""
+    return bool(told.per_turn and told.step)
 
 
 def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:

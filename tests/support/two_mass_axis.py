@@ -30,8 +30,10 @@ class TwoMassAxis:
     gap_m: float = 0.0
 
 
-def columns(axis: TwoMassAxis, seconds: float = 16.0, noise_n_m: float = 0.03, seed: int = 1) -> dict[str, np.ndarray]:
-    """t_s, set_mm, motor_deg, scale_mm, torque_Nm at 500 rows/s."""
+def columns(
+    axis: TwoMassAxis, seconds: float = 16.0, noise_n_m: float = 0.03, seed: int = 1, scale_mm: float = 0.001
+) -> dict[str, np.ndarray]:
+    """t_s, set_mm, motor_deg, scale_mm, torque_Nm at 500 rows/s; `scale_mm` is a step of the scale, half its noise."""
     rng, rate, inner = np.random.default_rng(seed), 500, 40
     dt, rows = 1.0 / (rate * inner), int(seconds * rate)
     command = _moves(rows, rate, rng)
@@ -59,7 +61,7 @@ def columns(axis: TwoMassAxis, seconds: float = 16.0, noise_n_m: float = 0.03, s
         "t_s": np.arange(rows) / rate,
         "set_mm": 1e3 * command,
         "motor_deg": np.degrees(np.floor(found[:, 0] / ratio / count) * count),
-        "scale_mm": np.round(1e3 * found[:, 1] + rng.normal(0.0, 0.002, rows), 3),
+        "scale_mm": scale_mm * np.round((1e3 * found[:, 1] + rng.normal(0.0, 2.0 * scale_mm, rows)) / scale_mm),
         "torque_Nm": found[:, 2] * ratio + rng.normal(0.0, noise_n_m, rows),
     }
 

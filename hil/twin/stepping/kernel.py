@@ -51,7 +51,7 @@ def _move(shapes, step, coupled, coupling, drive, push, force, delta):  # type: 
     free = table_free = 0.0
     for i in range(delta.shape[1]):
         g = (
-            shapes.motor[i] * drive
+            shapes.motor[i] * (drive + force.motor)
             + shapes.table[i] * push
             + shapes.spring[i] * force.spring
             + shapes.damper[i] * force.damper

@@ -28,11 +28,12 @@ class AxisMotion(NamedTuple):
 
 
 class Force(NamedTuple):
-    """Forces on the modes: through the shapes of spring, damper and screw."""
+    """Forces on the modes: through the shapes of spring, damper and screw, and of the motor."""
 
     spring: float
     damper: float
     screw: float
+    motor: float
 
 
 @njit(**COMPILE)
@@ -51,11 +52,29 @@ def moment(c, time, within, step, position, speed, table_m):  # type: ignore[no-
     return Moment(time, within, c.period, step, angle, speed, table_m, c.ratio, c.viscous_speed, 0.0)
 
 
+@njit(**COMPILE)
+def turned(at, angle_rad):  # type: ignore[no-untyped-def]
+    """The same moment with the motor turned further."""
+    angle = at.angle_rad + angle_rad
+    return Moment(
+        at.time_s,
+        at.within_s,
+        at.period_s,
+        at.step_s,
+        angle,
+        at.velocity,
+        at.table_position_m,
+        at.ratio_m,
+        at.viscous_speed,
+        at.torque,
+    )
+
+
 @njit(_nrt=False, forceinline=True, **COMPILE)
 def transmit(c, own, shapes, motion, at, effects, delta):  # type: ignore[no-untyped-def]
     """Forces on the modes at the middle of a step, and whether the table floats in a gap."""
     h = at.step_s
-    spring = damped = screw = 0.0
+    spring = damped = screw = motor = 0.0
     bent = effective = motion.stretch + 0.5 * h * motion.stretch_rate
     if effects.codes.transmission:
         effective = _transmission(bent, at, effects)
@@ -70,6 +89,9 @@ def transmit(c, own, shapes, motion, at, effects, delta):  # type: ignore[no-unt
         own.floating = 1.0 if floating else 0.0
         own.spring_extra = extra
         spring = -c.spring * extra
+        # an error of the transmission over the angle varies its ratio: the motor feels the spring by that, too
+        further = _transmission(bent, turned(at, NUDGE * c.angle_per_unit), effects)
+        motor = -c.spring * effective * (further - effective) / NUDGE
         damped = -rate
         if c.play > 0 and not floating:
             pressing = c.spring * effective + c.damper * (apart + rate)
@@ -80,7 +102,7 @@ def transmit(c, own, shapes, motion, at, effects, delta):  # type: ignore[no-unt
         if c.screw_apart > 0:
             effective = along(shapes.screw, delta[0]) + 0.5 * h * along(shapes.screw, delta[1])
         screw = -c.screw * effective * (_screw(1.0, at, effects) - 1.0)
-    return Force(spring, damped, screw)
+    return Force(spring, damped, screw, motor)
 
 
 @njit(**COMPILE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +25,31 @@ from hil.recording.recording import read_recording
 from hil.twin.library import BY_ID
 from hil.twin.structure.modal import modal
 
+_TRUE = """schema_version: 1
+name: true values
+axis:
+  model: two_mass
+  lead_m: 0.06283185
+  motor_mass_kg: 1.0
+  table_mass_kg: 14.0
+  stiffness_n_m: 6.0e+5
+  damping_ratio: 0.2
+  coulomb_torque_n_m: 0.04
+  viscous_torque_n_m_s_rad: 4.0e-3
+control: unknown
+encoders:
+  motor:
+    counts_per_rev: 65536
+  table:
+    resolution_m: 1.0e-7
+mechanisms:
+  - effect: table_side_friction
+    parameters:
+      share: 0.5
+  - effect: table_side_viscous_friction
+    parameters:
+      share: 0.5
+"""
 AXIS = TwoMassAxis(motor_kg=1.0, load_friction_n=24.0, motor_friction_n=2.0)
 
 
@@ -63,6 +89,20 @@ def test_no_torque_is_in_the_second_encoder(drafted: Dataset) -> None:
     np.testing.assert_array_equal(left, without)
     driven = [hypothesis.driven(one, drafted.observer_s)["table"] for one in (run, other)]
     assert not np.allclose(*driven)
+
+
+def test_rows_that_are_far_apart_leave_little_behind_the_motor(tmp_path: Path) -> None:
+    """True values and a mode of 33 Hz at rows of 6 ms: a torque that is held for a row left 4 times the noise."""
+    axis = TwoMassAxis(motor_kg=1.0, load_friction_n=2.0, load_viscous_n_s_m=30.0, motor_friction_n=2.0)
+    rows = {name: column[::3] for name, column in columns(axis, noise_n_m=0.1, scale_mm=1e-4).items()}
+    source = write(tmp_path / "log.csv", rows)
+    (tmp_path / "bench.yaml").write_text(_TRUE)
+    import_(source, None, tmp_path / "log.parquet")
+    data = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "bench.yaml")).train
+    (run,) = data.runs
+    assert follows(run, True, data.observer_s)
+    left = second_encoder(Hypothesis(data.bench), run, data.observer_s, False)["table"][run.evaluated]
+    assert float(np.std(left)) < 2.5 * run.noise.table_m
 
 
 def test_a_light_motor_leaves_little_behind_it(drafted: Dataset) -> None:

@@ -1,5 +1,6 @@
 """Damping of chains in the stepping kernel: where a lead errs, in play, with lost preload, with a structure."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -146,3 +147,16 @@ def test_a_structure_close_to_the_mode_of_the_chain_shares_its_damping(variant: 
     found = twin(axis, Active("structural_mode", structure, variant)).drive(torque).table_position_m
     expected = driven(longer, longer.stiffness_n_m_rad, longer.damping_n_m_s_rad, torque)
     assert off(found, expected) < 0.003
+
+
+def test_a_motor_feels_the_ratio_that_a_lead_error_varies() -> None:
+    """Virtual work: a force F on the table takes the torque F (r + de/dq) of a motor at constant feed."""
+    amplitude_m, force_n, speed, rows = 1e-5, 100.0, 2.0 * RATIO_M, 6000
+    error = Active("periodic_lead_error", (0.0, 0.0, amplitude_m, 0.5, 0.0, 0.0), 0)
+    time_s = GAINS.period_s * np.arange(rows)
+    axis = replace(twin(two_mass(400.0, 100.0, 1e8, 0.05, 2.0 * pi * RATIO_M), error), push_n=np.full(rows, -force_n))
+    moved = axis.simulate(speed * time_s, np.full(rows, speed), Start(0.0, speed))
+    settled = slice(2000, None)
+    angle, torque = moved.motor_position[settled], moved.torque[settled]
+    expected = force_n * (RATIO_M + 2.0 * amplitude_m * np.cos(2.0 * angle + 0.5))
+    np.testing.assert_allclose(torque, expected, rtol=1e-3)

@@ -11,7 +11,8 @@ torque tells the motion better (`hil.identification.residual_scales.follows`).
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from hil.identification.measured import Measured
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
-from hil.twin.axis import Response, Twin
+from hil.twin.axis import Response, Twin, taken_back
 from hil.twin.mechanism import Moment, Stage
 from hil.twin.physics import Active
 from hil.twin.structure.chain import Chain
@@ -53,27 +54,42 @@ def behind_motor(
     chain = _with_heavy_motor(twin.physics.chain)
     active = tuple(one for one in twin.active if not _by_torque(one))
     heavy = replace(twin, physics=replace(twin.physics, chain=chain), active=active)
-    table = _moved(heavy, measured, run, rest)
-    predicted = measured._replace(table_position_m=table)
+    predicted = measured._replace(table_position_m=_moved(heavy, _path(run, twin.late), run, rest))
     return {"table": differences(measured, predicted, hypothesis.bench, run.evaluated)["table"]}
 
 
-def _moved(heavy: Twin, measured: Response, run: Measured, rest: NDArray[np.bool_]) -> FloatArray:
-    """Second encoder (n,) of a twin whose heavy motor moves along a cubic spline through its measured positions.
+class _Path(NamedTuple):
+    """Cubic spline through the measured positions of the motor, and the second encoder, at ticks (n,) of a period.
 
-    Torque and friction are held from tick to tick: ticks are short, however long a row is.
+    The acceleration is the mean of a tick; `parts` ticks are a row.
     """
+
+    period_s: float
+    parts: int
+    motor: FloatArray
+    acceleration: FloatArray
+    table_m: FloatArray
+
+
+@lru_cache(maxsize=32)  # most parameters of a fit leave the lateness as it is
+def _path(run: Measured, late: tuple[Active, ...]) -> _Path:
+    measured = taken_back(run.response, late, run.period_s)
     parts = max(math.ceil(run.period_s / _LONGEST_TICK_S - 1e-6), 1)
     rows, period_s = np.arange(run.motor.size), run.period_s / parts
     ticks = np.arange(run.motor.size * parts + 1) / parts
-    path = CubicSpline(rows, measured.motor_position)
-    speed = path(ticks, 1) / run.period_s
-    torque = float(heavy.physics.chain.inertia_kg_m2.sum()) * np.diff(speed) / period_s
+    spline = CubicSpline(rows, measured.motor_position)
+    acceleration = np.diff(spline(ticks, 1)) / run.period_s / period_s
     table = np.interp(ticks[:-1], rows, measured.table_position_m)
-    longer = min(parts, _LONGER)
+    return _Path(period_s, parts, spline(ticks[:-1]), acceleration, table)
+
+
+def _moved(heavy: Twin, path: _Path, run: Measured, rest: NDArray[np.bool_]) -> FloatArray:
+    """Second encoder (n,) of a twin whose heavy motor moves along a path."""
+    parts, longer = path.parts, min(path.parts, _LONGER)
+    torque = float(heavy.physics.chain.inertia_kg_m2.sum()) * path.acceleration
     finer = replace(
         heavy,
-        gains=heavy.gains._replace(period_s=period_s),
+        gains=heavy.gains._replace(period_s=path.period_s),
         observer_s=heavy.observer_s / parts,
         push_n=np.repeat(heavy.push_n, parts),
         coarse_step_s=longer * heavy.coarse_step_s,
@@ -82,7 +98,7 @@ def _moved(heavy: Twin, measured: Response, run: Measured, rest: NDArray[np.bool
     moved = finer.observe(
         np.repeat(run.position_command_m, parts),
         np.repeat(run.velocity_command_m_s, parts),
-        Response(path(ticks[:-1]), table, torque, torque),
+        Response(path.motor, path.table_m, torque, torque),
         run.start,
         np.repeat(rest, parts),
         np.repeat(run.feedforward, parts),

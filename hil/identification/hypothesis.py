@@ -35,7 +35,7 @@ from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
 from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin, taken_back
 from hil.twin.library import BY_ID
-from hil.twin.mechanism import Contact, Stage
+from hil.twin.mechanism import Contact
 from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.physics import Active
 
@@ -246,8 +246,7 @@ class Hypothesis:
 
     def undelayed(self, twin: Twin, run: Measured) -> Response:
         """Measured channels without the lateness that terms, and a delay of the torque, give them."""
-        late = tuple(one for one in twin.active if one.form.stage is Stage.CHANNEL)
-        return _undelayed(run, late, (self.resolved.bench.torque_delay_s or 0.0) / run.period_s)
+        return _undelayed(run, twin.late, (self.resolved.bench.torque_delay_s or 0.0) / run.period_s)
 
     def blocks(
         self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None

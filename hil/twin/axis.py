@@ -103,6 +103,11 @@ class Twin:
         return arrays
 
     @property
+    def late(self) -> tuple[Active, ...]:
+        """Active mechanisms by which measured inputs are recorded late."""
+        return tuple(one for one in self.active if one.form.stage is Stage.CHANNEL)
+
+    @property
     def slow_velocity(self) -> float:
         """Speed of the motor [rad/s, m/s] below which it rests for the observer of the table."""
         return float(self._arrays[0][0]["slow_velocity"])

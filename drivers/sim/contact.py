@@ -15,12 +15,12 @@ WANDER_RATES = (1.0, 1.618034, 0.414214, 2.718282)
 
 
 @njit(cache=True)
-def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> tuple[float, float, float, float]:
-    """Coulomb bound F(v, x, t) >= 0, offset, smooth drag and factor on all three, with every active friction effect.
+def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> tuple[float, float, float, float, float]:
+    """Coulomb bound F(v, x, t) >= 0, offset, smooth drag, factor on all three, and on viscous friction, all effects in.
 
     friction = F sign(v) + offset + drag;  drag = Fv v + quadratic v |v|
     F = [Fc + (Fs - Fc) s(v / vs)] (1 + fraction sin(2 pi x / period + phase))
-    and all of them times 1 + fraction (1 - exp(-t / tau)). Curves: Armstrong-Helouvry et al. 1994.
+    and all of them, or Fv alone, times 1 + fraction (1 - exp(-t / tau)). Curves: Armstrong-Helouvry et al. 1994.
     """
     bound = p.coulomb
     drag = p.viscous * velocity
@@ -49,12 +49,18 @@ def friction_law(p: Any, velocity: float, position_m: float, time_s: float) -> t
     drag += p.nonlinear_viscous_friction.quadratic_n_m_s2_rad2 * velocity * abs(velocity)
     offset = p.asymmetric_friction.offset_torque_n_m
     scale: float = 1.0
+    thinner: float = 1.0
     if p.friction_drift.on:
-        scale += p.friction_drift.fraction * (1.0 - exp(-time_s / p.friction_drift.time_constant_s))
+        change = p.friction_drift.fraction * (1.0 - exp(-time_s / p.friction_drift.time_constant_s))
+        if p.friction_drift.form == 1:
+            thinner += change
+            drag += change * p.viscous * velocity
+        else:
+            scale += change
     if p.novel_friction_wander.on:
         w = p.novel_friction_wander
         scale *= 1.0 + w.fraction * wander(time_s / w.period_s, w.phase_rad)
-    return scale * bound, scale * offset, scale * drag, scale
+    return scale * bound, scale * offset, scale * drag, scale, scale * thinner
 
 
 @njit(cache=True)

@@ -66,8 +66,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
         "Coulomb and static friction plus share |torque of the motor - friction|", {"share": ParameterRange(0.0, 0.5)}),
     "nonlinear_viscous_friction": Definition("drag quadratic v |v|", {"quadratic_n_m_s2_rad2": _AT_LEAST_0}),
     "friction_drift": Definition(
-        "all friction times 1 + fraction (1 - exp(-t / time_constant))",
-        {"fraction": ParameterRange(low=-1.0), "time_constant_s": _POSITIVE}),
+        "all friction, or the viscous friction alone, times 1 + fraction (1 - exp(-t / time_constant))",
+        {"fraction": ParameterRange(low=-1.0), "time_constant_s": _POSITIVE},
+        ("", "viscous")),
     "cogging_torque": Definition(
         "motor torque + amplitude sin(cycles theta + phase)",
         {"amplitude_n_m": _AT_LEAST_0, "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE}),

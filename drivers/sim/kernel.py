@@ -115,12 +115,12 @@ def kick(p: Any, s: Any, index: int, side: int, share: float, viscous: float, ti
     h, ratio, mass = p.step_s, p.drive_ratio, moving_mass(p, index, time_s)
     speed = s.velocity[index] / ratio
     if p.varied_friction:
-        bound, offset, drag, scale = friction_law(p, speed, s.position[index], time_s)
+        bound, offset, drag, scale, thinner = friction_law(p, speed, s.position[index], time_s)
         if p.load_dependent_friction.on:
             towards = mass * s.velocity[index] + h * (s.force[index] - drag / ratio)
             bound = loaded_bound(p, bound, drag, scale, towards, s.torque)
         bound, offset = share * bound, share * offset
-        drag = share * drag + scale * (viscous - share * p.viscous) * speed
+        drag = share * drag + thinner * (viscous - share * p.viscous) * speed
     else:
         bound, offset, drag = share * p.coulomb, 0.0, viscous * speed
     force = s.force[index] - drag / ratio

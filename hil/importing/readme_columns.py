@@ -130,10 +130,10 @@ def _told(text: str) -> ToldColumn:
 
 
 def _equal(phrase: str) -> tuple[float, str] | None:
-    """Size and unit of a count or a volt, told by an equation: 1000 = 3.2 Nm, 10 V = 3 N m, 1 count = 2 um."""
+    """Size and unit of a count, told by an equation: 1000 = 3.2 Nm, 1 count = 2 um; None without one."""
     match = _EQUAL.search(phrase)
     whole, own, size, unit = match.groups() if match else ("", "", "", "")
-    if not (match and _is_unit(unit) and (not own or unit_named(own) in ("counts", "V"))):
+    if not (match and _is_unit(unit) and (not own or unit_named(own) == "counts")):
         return None
     many = float(re.sub(r",(?=\d{3})", "", whole))
     return (float(size.replace(",", ".")) / many, unit) if many else None

@@ -44,6 +44,7 @@ class Stage(StrEnum):
     MOTOR_TORQUE = "motor_torque"  # + torque on the motor beside the drive's and friction
     COULOMB = "coulomb"  # Coulomb friction level of the axis -> changed level
     FRICTION_SCALE = "friction_scale"  # x factor on all friction: Coulomb, viscous, drag
+    VISCOUS_SCALE = "viscous_scale"  # x factor on viscous friction alone
     DRAG = "drag"  # + torque opposing motion beyond Coulomb and viscous, signed as velocity
     BIAS = "bias"  # + shift of the band [-Fc, Fc] of Coulomb friction
     BRISTLE = "bristle"  # + stiffness of the contact before sliding; 0 is rigid contact

@@ -13,6 +13,7 @@ class Picture(StrEnum):
     FRICTION_OVER_TRAVEL = "change of Coulomb friction over position"
     FRICTION_OVER_LOAD = "change of friction over the torque of the motor"
     FRICTION_OVER_TIME = "change of friction over time"
+    VISCOUS_OVER_TIME = "change of viscous friction over time"
     FORCE_OVER_TRAVEL = "force on the table over position"
     FORCE_OVER_TIME = "force on the table within its period"
     COGGING = "torque over motor angle within its period"

@@ -116,8 +116,11 @@ def _against_motion(diagnosis: Diagnosis, view: View) -> FloatArray:
 
 def _friction(diagnosis: Diagnosis, view: View) -> FloatArray:
     """Friction (n,) of the axis against the motion, as a torque."""
-    physics, velocity = diagnosis.final.bench.axis.physics(), view.torque.velocity
-    return -(physics.coulomb_n_m * np.sign(velocity) + physics.viscous_n_m_s_rad * velocity)
+    return _coulomb(diagnosis, view) + _viscous(diagnosis, view)
+
+
+def _viscous(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return -diagnosis.final.bench.axis.physics().viscous_n_m_s_rad * view.torque.velocity
 
 
 def _coulomb(diagnosis: Diagnosis, view: View) -> FloatArray:
@@ -250,6 +253,9 @@ LAWS: dict[Picture, DrawnLaw] = {
     ),
     Picture.FRICTION_OVER_TIME: DrawnLaw(
         TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "friction, change", "1", carrier=_friction
+    ),
+    Picture.VISCOUS_OVER_TIME: DrawnLaw(
+        TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "viscous friction, change", "1", carrier=_viscous
     ),
     Picture.FORCE_OVER_TRAVEL: DrawnLaw(
         WAY, lambda term, d, x: _at(term, d, table_m=x), "force on the table", "force", carrier=_ratio

@@ -1,4 +1,4 @@
-"""Friction drift: friction changes as the axis warms up."""
+"""Friction drift: friction changes as the axis warms up, all of it or, as a lubricant thins, its viscous part."""
 
 import math
 
@@ -21,13 +21,27 @@ MECHANISM = Mechanism(
     id="friction_drift",
     block=Block.MOTOR_SIDE,
     element="lubricant of nut and bearings",
-    equation="F(t) = F (1 + a (1 - exp(-t/tau)))",
+    equation="F(t) = F (1 + a (1 - exp(-t/tau))); viscous: of the viscous friction alone",
     source="Bittencourt and Gunnarsson, ASME J. Dynamic Systems, Measurement, and Control 134 (2012) 051013",
     parameters=(
         Parameter("fraction", Dimension.RATIO, -0.95, 5.0, role=Role.STRENGTH),
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
-    variants=(Variant(Stage.FRICTION_SCALE, _warming),),
+    variants=(
+        Variant(Stage.FRICTION_SCALE, _warming),
+        Variant(
+            Stage.VISCOUS_SCALE,
+            _warming,
+            "viscous",
+            text=Text(
+                "Viscous friction changes by a share of {fraction} while the axis runs, within about "
+                "{time_constant_s}.",
+                Picture.VISCOUS_OVER_TIME,
+                rate="Viscous friction changes by a share of {rate} per minute while it is recorded; where it ends is "
+                "not told.",
+            ),
+        ),
+    ),
     text=Text(
         "Friction changes by a share of {fraction} while the axis runs, within about {time_constant_s}.",
         Picture.FRICTION_OVER_TIME,

@@ -8,7 +8,7 @@ from hil.twin.stepping.contact import COMPILE, Resistance
 
 _coulomb, _friction_scale, _drag = stages.coulomb, stages.friction_scale, stages.drag
 _bias, _bristle, _table_share = stages.bias, stages.bristle, stages.table_share
-_table_viscous_share = stages.table_viscous_share
+_table_viscous_share, _viscous_scale = stages.table_viscous_share, stages.viscous_scale
 _rigid, _elastic, _slipping = contact.rigid, contact.elastic, contact.slipping
 
 
@@ -30,10 +30,10 @@ def under(at, torque, speed):  # type: ignore[no-untyped-def]
 
 
 @njit(_nrt=False, forceinline=True, **COMPILE)
-def level(c, scale, at, effects):  # type: ignore[no-untyped-def]
+def level(c, scale, viscous, at, effects):  # type: ignore[no-untyped-def]
     """Coulomb friction and drag at the speed of the moment, whose torque is that of the motor."""
     drag = scale * _drag(0.0, at, effects)
-    loaded = under(at, at.torque - scale * c.viscous * at.velocity - drag, at.velocity)
+    loaded = under(at, at.torque - viscous * at.velocity - drag, at.velocity)
     return scale * max(_coulomb(c.coulomb, loaded, effects), 0.0), drag
 
 
@@ -60,12 +60,14 @@ def friction(c, own, internal, motion, at, effects, free, table_free):  # type: 
     stiffness = _bristle(0.0, at, effects)
     scale = max(_friction_scale(1.0, at, effects), 0.0)
     viscous_share = _table_viscous_share(share, at, effects)
-    viscous, rest = scale * c.viscous, 1.0 - share
-    viscous, guide_viscous = (1.0 - viscous_share) * viscous, viscous_share * viscous
-    bound, opposing = level(c, scale, at, effects)
+    every, rest = scale * max(_viscous_scale(1.0, at, effects), 0.0) * c.viscous, 1.0 - share
+    viscous, guide_viscous = (1.0 - viscous_share) * every, viscous_share * every
+    bound, opposing = level(c, scale, every, at, effects)
     if effects.codes.coulomb or effects.codes.drag:  # at the middle of the step friction over speed is second order
         met = _rigid(free, gain, Resistance(rest * bound, viscous, shift, rest * opposing))
-        bound, opposing = level(c, scale, under(at, at.torque, 0.5 * (motion.speed + free - gain * met)), effects)
+        bound, opposing = level(
+            c, scale, every, under(at, at.torque, 0.5 * (motion.speed + free - gain * met)), effects
+        )
     resistance = Resistance(rest * bound, viscous, shift, rest * opposing)
     motor = _contact(c.slips, free, gain, resistance, rest * stiffness, own.motor_contact, at.step_s, motion.speed)
     guide = 0.0

@@ -16,7 +16,7 @@ from hil.twin.stepping.records import shapes_of
 from hil.twin.stepping.static_equilibrium import settle
 from hil.twin.stepping.transmission import moment
 
-_scale, _bias = stages.friction_scale, stages.bias
+_scale, _viscous_scale, _bias = stages.friction_scale, stages.viscous_scale, stages.bias
 _share, _viscous_share = stages.table_share, stages.table_viscous_share
 _current, _torque, _motor_torque, _table_force = stages.current, stages.torque, stages.motor_torque, stages.table_force
 _Effects = stages.Effects
@@ -36,16 +36,17 @@ def steady(positions, speed, time_s, constants, modes, values, codes, memory):  
         scale = max(_scale(1.0, at, effects), 0.0)
         share = _share(0.0, at, effects)
         viscous_share = _viscous_share(share, at, effects)
-        viscous = scale * c.viscous * speed
+        every = scale * max(_viscous_scale(1.0, at, effects), 0.0) * c.viscous
+        viscous = every * speed
         moved = _bias(0.0, at, effects) + viscous - _table_force(0.0, at, effects) * c.ratio
         other, goal, sliding = _motor_torque(0.0, at, effects), moved, 0.0
         for _ in range(INVERSIONS):  # friction may grow with the torque that it is part of: Steffensen's method
-            bound, drag = level(c, scale, under(at, goal - other, speed), effects)
+            bound, drag = level(c, scale, every, under(at, goal - other, speed), effects)
             sliding = sign * bound + drag
             once = moved + sliding
             if abs(once - goal) <= INVERTED * abs(once):
                 break
-            bound, drag = level(c, scale, under(at, once - other, speed), effects)
+            bound, drag = level(c, scale, every, under(at, once - other, speed), effects)
             twice = moved + sign * bound + drag
             bent = twice - 2.0 * once + goal
             goal = goal - (once - goal) ** 2 / bent if bent != 0.0 else twice

@@ -129,6 +129,12 @@ def test_friction_drift_scales_all_friction_with_time() -> None:
     assert friction_n_m(effect, 10.0, after_s=2.0) == pytest.approx(cold * (1 - 0.4 * (1 - np.exp(-1))), rel=1e-4)
 
 
+def test_a_viscous_drift_leaves_coulomb_friction_as_it_is() -> None:
+    effect = Effect("friction_drift", {"fraction": -0.4, "time_constant_s": 2.0}, "viscous")
+    warm = 1.1 + 0.064 * (1 - 0.4 * (1 - np.exp(-1)))
+    assert friction_n_m(effect, 10.0, after_s=2.0) == pytest.approx(warm, rel=1e-4)
+
+
 def test_table_side_friction_acts_behind_the_spring() -> None:
     """All friction on the table: the motor winds up the spring by T / (r k), the table does not stir."""
     plant = plant_with(AXIS, Effect("table_side_friction", {"share": 1.0}))
@@ -150,12 +156,14 @@ def test_viscous_friction_on_the_table_has_a_share_of_its_own(coulomb: float, mo
         Effect("table_side_friction", {"share": coulomb}),
         Effect("table_side_viscous_friction", {"share": more}),
     ]
-    for drift, scale in ((), 1.0), ((Effect("friction_drift", {"fraction": 0.5, "time_constant_s": 1e-3}),), 1.5):
-        plant = plant_with(AXIS, *effects, *drift)
-        plant.advance(scale * (1.1 + 0.64), 0.01)
+    warm = {"fraction": 0.5, "time_constant_s": 1e-3}
+    drifts = (Effect("friction_drift", warm), 1.5, 1.5), (Effect("friction_drift", warm, "viscous"), 1.0, 1.5)
+    for drift, scale, thicker in ((None, 1.0, 1.0), *drifts):
+        plant = plant_with(AXIS, *effects, *([drift] if drift else []))
+        plant.advance(scale * 1.1 + thicker * 0.64, 0.01)
         plant.velocities_m_s[:] = 100.0 * R
-        plant.advance(scale * (1.1 + 0.64), 0.5)
-        held = scale * (1.1 * coulomb + 0.64 * viscous) / R
+        plant.advance(scale * 1.1 + thicker * 0.64, 0.5)
+        held = (scale * 1.1 * coulomb + thicker * 0.64 * viscous) / R
         assert plant.velocities_m_s[0] == pytest.approx(100.0 * R, rel=1e-3)
         assert (plant.positions_m[0] - plant.positions_m[1]) * 5.64e7 == pytest.approx(held, rel=1e-2, abs=1.0)
 

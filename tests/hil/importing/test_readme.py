@@ -334,3 +334,72 @@ def test_counts_of_the_motor_are_not_measured_where_they_are_told(tmp_path: Path
 def test_counts_per_length_are_none_per_turn(said: str, per_turn: int | None) -> None:
     told = told_columns([f"- x_1: {said}", "- t: time [s]", "- M: torque [Nm]"], ["x_1", "t", "M"])
     assert (told["x_1"].per_turn if "x_1" in told else None) == per_turn
+
+
+@pytest.mark.parametrize(
+    ("line", "size"),
+    [
+        ("trq - 0.1 % of rated torque (1000 = 3.2 Nm)", 3.2e-3),
+        ("trq: actual torque, 1 count = 2 mNm", 2e-3),
+        ("trq - counts (1,000 counts = 3.2 Nm)", 3.2e-3),
+    ],
+)
+def test_an_equation_tells_the_size_of_a_number(line: str, size: float, tmp_path: Path) -> None:
+    """Nor is a number of the file the rated torque."""
+    raw = AXIS["torque"] / size
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq": np.round(raw)})
+    (tmp_path / "README.md").write_text(f"Axis with a motor of 3.2 Nm rated torque.\n- pos_rad: rad\n- {line}\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")["torque_n_m"]
+    np.testing.assert_allclose(found, AXIS["torque"], atol=size)
+
+
+@pytest.mark.parametrize("whole", ["largest current 40 A (= 100 % TRQ)", "100 % = 40 A"])
+def test_a_share_of_a_current_is_a_torque_by_the_constant_of_the_motor(whole: str, tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_%": AXIS["torque"] / (40.0 * 1.1) * 100.0}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(f"torque constant 1.1 N m/A\n{whole}\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
+
+
+def test_a_second_encoder_has_its_own_counts_against_its_name(tmp_path: Path) -> None:
+    """The owner calls columns by the last part of their names; the joint turns a tenth of the motor."""
+    counts = {"log.Pos [cnt]": (65536, 1.0), "log.Aux [cnt]": (524288, 0.1)}
+    columns = {name: np.round(share * AXIS["angle"] / (2.0 * np.pi) * per) for name, (per, share) in counts.items()}
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], **columns, "log.iq [A]": AXIS["torque"] / CONSTANT})
+    (tmp_path / "README.md").write_text(
+        f"torque constant {CONSTANT} Nm/A\n- Pos [cnt]: motor encoder, 65536 cnt per motor turn\n"
+        "- Aux [cnt]: joint encoder at the output, 524288 cnt per turn of the joint\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(found["motor_position_rad"], AXIS["angle"], atol=1e-3)
+    np.testing.assert_allclose(found["table_position_m"], 0.1 * AXIS["angle"], atol=1e-4)
+
+
+def test_a_counter_that_follows_the_motor_is_an_encoder(tmp_path: Path) -> None:
+    columns = {
+        "time_s": AXIS["t"],
+        "Axis1.Pos_rad": AXIS["angle"],
+        "Axis1.Torque_Nm": AXIS["torque"],
+        "EL5151.CounterValue": np.round(AXIS["angle"] * 0.03 / (2.0 * np.pi) * 20000.0) + 47200,
+    }
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(
+        "Motor 30.0 mm per motor revolution.\nA draw-wire encoder, 20 increments per mm.\n"
+        "* Axis1.Pos_rad - rad\n* EL5151.CounterValue - increments of the draw-wire\n"
+    )
+    entries = {one.channel: one.entry for one in draft_map(path, readme=tmp_path / "README.md").channels}
+    assert entries["table_position_m"] == {"column": "EL5151.CounterValue", "unit": "counts", "counts_per_m": 20000.0}
+
+
+def test_a_restated_inertia_is_read_once(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_Nm": AXIS["torque"]})
+    (tmp_path / "README.md").write_text(
+        "motor + wave gen.  1.62e-4 kg m^2 at the motor shaft (= 1.62 kg m^2 at the joint)\n"
+        "arm                4.5 kg, centre of mass at 0.38 m, inertia about the axis 0.90 kg m^2\n"
+    )
+    told = draft_map(path, readme=tmp_path / "README.md").table.constants
+    found = {constant.value: one.value for constant, one in told.items()}
+    assert found == {"motor_inertia_kg_m2": 1.62e-4, "load_inertia_kg_m2": 0.9, "load_mass_kg": 4.5}

@@ -52,6 +52,12 @@ def test_the_force_that_holds_the_speed_at_which_the_strength_is_told(active, fo
         assert speeds(found)[-1] == pytest.approx(sign * SPEED_M_S, rel=1e-4)
 
 
+def test_a_lubricant_that_thins_changes_viscous_friction_alone() -> None:
+    warm = Active("friction_drift", (-0.4, 1e-3), 1)
+    found = twin(warm).drive(np.full(10_000, COULOMB_N + 0.6 * VISCOUS_N_S_M * SPEED_M_S))
+    assert speeds(found)[-1] == pytest.approx(SPEED_M_S, rel=1e-4)
+
+
 @pytest.mark.parametrize(
     "contact",
     [(), (Active("presliding_hysteresis", (4e6,)),), (Active("presliding_hysteresis", (4e6,), 1),)],

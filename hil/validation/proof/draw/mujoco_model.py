@@ -154,7 +154,7 @@ def _friction_drift(axis: DrawnAxis, p: Values, form: str) -> Acting:
 
     def act(model: Any, data: Any) -> None:
         scale = 1.0 + p["fraction"] * (1.0 - exp(-data.time / p["time_constant_s"]))
-        model.dof_frictionloss[_MOTOR] = scale * coulomb
+        model.dof_frictionloss[_MOTOR] = coulomb if form == "viscous" else scale * coulomb
         data.qfrc_applied[_MOTOR] = (1.0 - scale) * viscous * data.qvel[_MOTOR]
 
     return act

@@ -36,7 +36,7 @@ _TORQUE = (Stage.CURRENT, Stage.TORQUE, Stage.MOTOR_TORQUE)
 _MEMORY = 64  # values that a friction may remember, at most
 _HEAVIER = 1e3  # motor over the axis: the spring moves it by a thousandth, which the observer takes back
 _LONGEST_TICK_S = 2e-3  # of a twin that follows the motor: short against a mode up to 100 Hz
-_LONGER = 2  # internal steps of such ticks, at most: as those of a row of 4 ms
+_LONGER = 2  # coarse steps of such ticks, at most: as those of a row of 4 ms
 _MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
 
 
@@ -71,7 +71,7 @@ class _Path(NamedTuple):
     table_m: FloatArray
 
 
-@lru_cache(maxsize=32)  # most parameters of a fit leave the lateness as it is
+@lru_cache(maxsize=8)  # most parameters of a fit leave the lateness as it is
 def _path(run: Measured, late: tuple[Active, ...]) -> _Path:
     measured = taken_back(run.response, late, run.period_s)
     parts = max(math.ceil(run.period_s / _LONGEST_TICK_S - 1e-6), 1)
@@ -85,15 +85,14 @@ def _path(run: Measured, late: tuple[Active, ...]) -> _Path:
 
 def _moved(heavy: Twin, path: _Path, run: Measured, rest: NDArray[np.bool_]) -> FloatArray:
     """Second encoder (n,) of a twin whose heavy motor moves along a path."""
-    parts, longer = path.parts, min(path.parts, _LONGER)
+    parts = path.parts
     torque = float(heavy.physics.chain.inertia_kg_m2.sum()) * path.acceleration
     finer = replace(
         heavy,
         gains=heavy.gains._replace(period_s=path.period_s),
         observer_s=heavy.observer_s / parts,
         push_n=np.repeat(heavy.push_n, parts),
-        coarse_step_s=longer * heavy.coarse_step_s,
-        fine_step_s=longer * heavy.fine_step_s,
+        coarse_step_s=min(parts, _LONGER) * heavy.coarse_step_s,
     )
     moved = finer.observe(
         np.repeat(run.position_command_m, parts),

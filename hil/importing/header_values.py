@@ -41,7 +41,6 @@ _WHOLE_IS = re.compile(  # 100 % = 28 N m, or 28 N m (= 100 %)
     r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*(?P<size>\d[\d.,]*)\s*(?P<unit>[a-z][a-z·* ]*)"
     r"|(?P<before>\d[\d.,]*)\s*(?P<its>[a-z][a-z·* ]*?)\s*[(\[]?\s*(?:=|is|equals|corresponds to|entspricht)\s*100\s*%"
 )
-_RATED = ("rated torque", "rated force", "rated current")
 _EQUALS, _RESTATED = re.compile(r"\s*=\s*"), re.compile(r"[(\[]\s*=\s*$")
 _PRODUCT = re.compile(r"=\s*([a-z]\w*)\s*[*x·]\s*([a-z]\w*)\s*$")
 # behind a number: 32 mm [of strip, ram feed] per motor revolution; 10 mm pitch directly coupled, 4 mm lead, ...
@@ -55,7 +54,7 @@ _DEVIATES = re.compile(
     r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
     r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"
 )
-_SENTENCES = re.compile(r"(?<!\bca)(?<!\bapprox)(?<!\babt)[.;!?](?:\s|$)")
+_SENTENCES = re.compile(r"(?<!\bca)(?<!\bapprox)(?<!\babt)[.;!?](?:\s(?!\s)|$)")  # two blanks: a column
 _GROUPED = re.compile(r"\d{1,3}(?:[.,]\d{3})+(?:[.,]\d+)?")  # 1,200 is 1200 or 1.2
 _THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+")  # or a decimal comma
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
@@ -104,8 +103,9 @@ def _statements(line: str) -> Iterator[Statement]:
         return
     if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole["size"] or whole["before"])) is not None:
         units = tuple(_units_behind(whole["unit"] or whole["its"]))
-        yield from (Statement(words, size, units, header_text(line)) for words in _RATED)
-        return
+        yield from (Statement(f"rated {of}", size, units, header_text(line)) for of in ("torque", "force", "current"))
+        if whole["size"]:  # the rest of the line says of which
+            return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
         before = folded[matches[index - 1].end() if index else 0 : match.start()]
@@ -113,7 +113,8 @@ def _statements(line: str) -> Iterator[Statement]:
         value, behind = _number(match[0]), folded[match.end() : end]
         if value is None or _is_list(folded, matches[index:], value):
             continue
-        if _EQUALS.fullmatch(behind) or _RESTATED.search(before):  # 1000 = 3.2 Nm; 1.6e-4 kg m2 (= 1.6 at the joint)
+        restated = index and _RESTATED.search(before)  # 1.6e-4 kg m2 (= 1.6 at the joint)
+        if restated or (_EQUALS.fullmatch(behind) and before.endswith("(")):  # (1000 = 3.2 Nm)
             continue
         if not _THOUSANDS.fullmatch(match[0]):
             yield from told_behind(before, value, behind, header_text(line))
@@ -134,8 +135,7 @@ def _words_before(before: str, value: float, behind: str, line: str) -> Statemen
     words, phrase = _plain(told), _plain(_PHRASES.split(told.rstrip(" ;,|\t:=\"'"))[-1])
     if unit and not any(units_behind) and not bracket:
         words, units, phrase = name, [unit], _unit_of_name(phrase)[0]
-    # a sentence does not begin with its number: the point before it is that of a short word
-    sentence = next(filter(None, map(_plain, reversed(_SENTENCES.split(told)))), "")
+    sentence = _plain(_SENTENCES.split(told)[-1])
     return Statement(words, value, (*units, *units_behind), line, phrase, sentence)
 
 

@@ -11,7 +11,8 @@ from hil.importing.lexicon import Constant, lexicon, without_accents
 from hil.importing.values_behind import Statement
 
 _SHORT = 4  # letters: a longer word may have another ending
-_OF_LINE = re.compile(r"^(?:\w+ )?(?:inertia|tragheitsmoment|inertie|inerzia|inercia)(?: about the axis)?$")
+_INERTIA = re.compile(r"inertia|tragheitsmoment|inertie|inerzia|inercia")
+_OF_LINE = re.compile(rf"^(?:\w+ )?(?:{_INERTIA.pattern})(?: about the axis)?$")
 _GOES_ON = re.compile(r"k?g[cm]?m|kg(?:\+|plus).*")  # kg m, kg plus others
 
 
@@ -19,7 +20,7 @@ def mass_told(told: Statement) -> tuple[Constant, float] | None:
     """Constant and value [SI] of a statement; None for one that tells neither mass nor inertia of one part."""
     known, words = lexicon().masses, told.sentence.split()
     if _OF_LINE.search(told.sentence):  # arm 4.5 kg, inertia about the axis 0.9 kg m^2
-        words = [*re.findall(r"[^\W\d_]+", without_accents(re.split(r"\d", told.text)[0]).lower()), *words]
+        words = [*re.findall(r"[^\W\d_]+", _INERTIA.split(without_accents(told.text).lower())[0]), *words]
     of_load, of_motor, of_neither = (
         [place for place, word in enumerate(words) if _is_one_of(word, some)]
         for some in (known.load, known.motor, known.neither)

@@ -1,5 +1,6 @@
 """Hints of a user about a file: sampling rate, axis, and a README or data sheet with sizes and units."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -50,30 +51,35 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     encoding = encoding_of(raw)
     lines = [line.decode(encoding) for line in raw]
     titles = {table.titles.get(name, name): name for name in table.columns}
-    titles = _last_words(titles) | titles
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
-    found = told_columns(lines, list(titles)) | listed
-    told = {titles[title]: found[title] for title in titles if title in found}
+    told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
+    if parts := _last_parts(titles):
+        told = {parts[part]: one for part, one in told_columns(lines, list(parts)).items()} | told
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
     if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
-        told = {name: _as_angle(name, one) if name != motor else one for name, one in told.items()}
-    steps = {name: one.step for name, one in told.items() if one.step and name not in table.units}
+        told = {name: _as_angle(table, name, one) if name != motor else one for name, one in told.items()}
+    firm = {name: one.unit for name, one in told.items() if one.per_turn and one.step}
+    steps = {name: one.step for name, one in told.items() if one.step and (name in firm or name not in table.units)}
     return replace(
         table,
         units={name: one.unit for name, one in told.items() if one.unit} | table.units,
         scales={name: (step, 0.0) for name, step in steps.items()} | table.scales,
-        firm_units={name: one.unit for name, one in told.items() if _is_angle(one)},
+        firm_units=firm,
         words={name: one.words for name, one in told.items() if one.words} | table.words,
         constants=constants | table.constants,
     )
 
 
-def _last_words(titles: Mapping[str, str]) -> dict[str, str]:
+def _last_parts(titles: Mapping[str, str]) -> dict[str, str]:
     """Columns by the last part of a title with points, if one has it: enc of log.enc, as its owner calls it."""
     last = [(title.rpartition(".")[2], name) for title, name in titles.items() if "." in title]
     parts = [part for part, _ in last]
-    return {part: name for part, name in last if parts.count(part) == 1 and part not in titles}
+    return {
+        part: name
+        for part, name in last
+        if re.match(r"[^\W\d]", part) and parts.count(part) == 1 and part not in titles
+    }
 
 
 def _motor_encoder(told: Mapping[str, ToldColumn]) -> str:
@@ -82,15 +88,14 @@ def _motor_encoder(told: Mapping[str, ToldColumn]) -> str:
     return motors[0] if len(motors) == 1 else ""
 
 
-def _as_angle(name: str, told: ToldColumn) -> ToldColumn:
+def _as_angle(table: ForeignTable, name: str, told: ToldColumn) -> ToldColumn:
     """A column of another encoder, with counts per turn of its own, as an angle; a set-point is in those of a drive."""
-    own = told.per_turn and not label(name, "", told.words).command
-    return told._replace(unit="deg", step=360.0 / told.per_turn) if own and told.per_turn else told
-
-
-def _is_angle(told: ToldColumn) -> bool:
-    """True for counts that a README makes an angle, though the name of the column says counts."""
-    return bool(told.per_turn and told.step)
+    title = table.titles.get(name, name)
+    unit = unit_named(table.units[name]) if name in table.units else label(title).unit
+    counts = unit in (None, "counts") and is_whole(table.columns[name])
+    if not (told.per_turn and counts) or label(name, "", told.words).command:
+        return told
+    return told._replace(unit="deg", step=360.0 / told.per_turn)
 
 
 def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:

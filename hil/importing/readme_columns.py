@@ -18,7 +18,7 @@ _BEHIND_NAME = r"(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|\t\s*|\s*(?=[\[(]))"
 _NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)(.*)")
 _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
-_EQUAL = re.compile(r"(?:^|\s)(\d+(?:[.,]\d+)*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)$")
+_EQUAL = re.compile(r"(\d+(?:,\d{3})*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)")
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
 _PER_TURN = re.compile(  # 65536 counts per motor turn
@@ -115,9 +115,10 @@ def _of_both(text: str) -> ToldColumn | None:
 def _told(text: str) -> ToldColumn:
     """Words, unit and step of what is said of a column. A plain unit goes before the size of a count."""
     phrases = _phrases(text)
-    if equal := next(filter(None, map(_equal, phrases)), None):
-        return ToldColumn(phrases[0], equal[1], equal[0])
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
+    equal = next(filter(None, map(_equal, phrases)), None)
+    if equal and (not unit or unit_named(unit) in ("counts", "%", "permille")):
+        return ToldColumn("" if _equal(phrases[0]) else phrases[0], equal[1], equal[0])
     words = phrases[0] if phrases and phrases[0] != unit else ""
     counts = unit_named(unit) == "counts"
     per_turn = next(
@@ -131,12 +132,12 @@ def _told(text: str) -> ToldColumn:
 
 def _equal(phrase: str) -> tuple[float, str] | None:
     """Size and unit of a count, told by an equation: 1000 = 3.2 Nm, 1 count = 2 um; None without one."""
-    match = _EQUAL.search(phrase)
+    match = _EQUAL.fullmatch(phrase)
     whole, own, size, unit = match.groups() if match else ("", "", "", "")
     if not (match and _is_unit(unit) and (not own or unit_named(own) == "counts")):
         return None
-    many = float(re.sub(r",(?=\d{3})", "", whole))
-    return (float(size.replace(",", ".")) / many, unit) if many else None
+    many, value = float(whole.replace(",", "")), float(size.replace(",", "."))
+    return (value / many, unit) if many and value else None
 
 
 def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:

@@ -89,15 +89,15 @@ def transmit(c, own, shapes, motion, at, effects, delta):  # type: ignore[no-unt
         own.floating = 1.0 if floating else 0.0
         own.spring_extra = extra
         spring = -c.spring * extra
-        # an error of the transmission over the angle varies its ratio: the motor feels the spring by that, too
-        further = _transmission(bent, turned(at, NUDGE * c.angle_per_unit), effects)
-        motor = -c.spring * effective * (further - effective) / NUDGE
         damped = -rate
-        if c.play > 0 and not floating:
-            pressing = c.spring * effective + c.damper * (apart + rate)
-            if pressing * effective < 0.0:  # flanks with play push, they do not pull
-                spring += c.spring * effective
-                damped += apart + rate
+        pressing = c.spring * effective + c.damper * (apart + rate)
+        if c.play > 0 and not floating and pressing * effective < 0.0:  # flanks with play push, they do not pull
+            spring += c.spring * effective
+            damped += apart + rate
+            pressing = 0.0
+        # an error of the transmission over the angle varies its ratio: the motor feels what it carries by that, too
+        further = _transmission(bent, turned(at, NUDGE * c.angle_per_unit), effects)
+        motor = -pressing * (further - effective) / NUDGE
     if effects.codes.screw:
         if c.screw_apart > 0:
             effective = along(shapes.screw, delta[0]) + 0.5 * h * along(shapes.screw, delta[1])

@@ -125,12 +125,6 @@ def _channel_time_skew(s: DrawScale, rng: Rng) -> FormAndParameters:
     return form, {"delay_s": log_uniform(rng, 0.1e-3 if form == "torque" else 10e-6, 2e-3)}
 
 
-def _friction_drift(s: DrawScale, rng: Rng) -> FormAndParameters:
-    fraction = any_sign(rng) * log_uniform(rng, 0.08, 0.6)
-    form = str(rng.choice(("", "viscous")))
-    return form, {"fraction": fraction, "time_constant_s": log_uniform(rng, 2.0, 20.0)}
-
-
 _PLAIN: Mapping[str, Callable[[DrawScale, Rng], dict[str, float]]] = {
     "asymmetric_friction": lambda s, rng: {
         "offset_torque_n_m": any_sign(rng) * s.coulomb * log_uniform(rng, 0.03, 0.4)
@@ -143,6 +137,10 @@ _PLAIN: Mapping[str, Callable[[DrawScale, Rng], dict[str, float]]] = {
     },
     "nonlinear_viscous_friction": lambda s, rng: {
         "quadratic_n_m_s2_rad2": s.coulomb * log_uniform(rng, 0.1, 1.5) / (s.axis.feed_m_s / s.ratio) ** 2
+    },
+    "friction_drift": lambda s, rng: {
+        "fraction": any_sign(rng) * log_uniform(rng, 0.08, 0.6),
+        "time_constant_s": log_uniform(rng, 2.0, 20.0),
     },
     "cogging_torque": lambda s, rng: {
         "amplitude_n_m": s.coulomb * log_uniform(rng, 0.02, 0.3),
@@ -186,7 +184,6 @@ _PLAIN: Mapping[str, Callable[[DrawScale, Rng], dict[str, float]]] = {
     },
 }
 _WITH_FORM: Mapping[str, Callable[[DrawScale, Rng], FormAndParameters]] = {
-    "friction_drift": _friction_drift,
     "stribeck_friction": lambda s, rng: (
         str(rng.choice(("gaussian", "exponential", "atan"), p=(0.4, 0.3, 0.3))),
         {

@@ -1,0 +1,141 @@
+"""Sizes in a text of the owner: equations, shares of a current, counts of a second encoder, parts of the mass."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_axis import axis, write
+
+from hil.commands.import_ import import_
+from hil.importing.draft_map import draft_map
+from hil.importing.readme_columns import told_columns
+from hil.recording.recording import read_recording
+
+AXIS = axis()
+CONSTANT = 0.25
+
+
+@pytest.mark.parametrize(
+    ("line", "size"),
+    [
+        ("trq - 0.1 % of rated torque (1000 = 3.2 Nm)", 3.2e-3),
+        ("trq: actual torque, 1 count = 2 mNm", 2e-3),
+        ("trq - counts (1,000 counts = 3.2 Nm)", 3.2e-3),
+    ],
+)
+def test_an_equation_tells_the_size_of_a_number(line: str, size: float, tmp_path: Path) -> None:
+    """Nor is a number of the file the rated torque."""
+    raw = AXIS["torque"] / size
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq": np.round(raw)})
+    (tmp_path / "README.md").write_text(f"Axis with a motor of 3.2 Nm rated torque.\n- pos_rad: rad\n- {line}\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")["torque_n_m"]
+    np.testing.assert_allclose(found, AXIS["torque"], atol=size)
+
+
+@pytest.mark.parametrize("whole", ["largest current 40 A (= 100 % TRQ)", "100 % = 40 A"])
+def test_a_share_of_a_current_is_a_torque_by_the_constant_of_the_motor(whole: str, tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_%": AXIS["torque"] / (40.0 * 1.1) * 100.0}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(f"torque constant 1.1 N m/A\n{whole}\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
+
+
+def test_a_second_encoder_has_its_own_counts_against_its_name(tmp_path: Path) -> None:
+    """The owner calls columns by the last part of their names; the joint turns a tenth of the motor."""
+    counts = {"log.Pos [cnt]": (65536, 1.0), "log.Aux [cnt]": (524288, 0.1)}
+    columns = {name: np.round(share * AXIS["angle"] / (2.0 * np.pi) * per) for name, (per, share) in counts.items()}
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], **columns, "log.iq [A]": AXIS["torque"] / CONSTANT})
+    (tmp_path / "README.md").write_text(
+        f"torque constant {CONSTANT} Nm/A\n- Pos [cnt]: motor encoder, 65536 cnt per motor turn\n"
+        "- Aux [cnt]: joint encoder at the output, 524288 cnt per turn of the joint\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(found["motor_position_rad"], AXIS["angle"], atol=1e-3)
+    np.testing.assert_allclose(found["table_position_m"], 0.1 * AXIS["angle"], atol=1e-4)
+
+
+def test_a_counter_that_follows_the_motor_is_an_encoder(tmp_path: Path) -> None:
+    columns = {
+        "time_s": AXIS["t"],
+        "Axis1.Pos_rad": AXIS["angle"],
+        "Axis1.Torque_Nm": AXIS["torque"],
+        "EL5151.CounterValue": np.round(AXIS["angle"] * 0.03 / (2.0 * np.pi) * 20000.0) + 47200,
+    }
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(
+        "Motor 30.0 mm per motor revolution.\nA draw-wire encoder, 20 increments per mm.\n"
+        "* Axis1.Pos_rad - rad\n* EL5151.CounterValue - increments of the draw-wire\n"
+    )
+    entries = {one.channel: one.entry for one in draft_map(path, readme=tmp_path / "README.md").channels}
+    assert entries["table_position_m"] == {"column": "EL5151.CounterValue", "unit": "counts", "counts_per_m": 20000.0}
+
+
+def test_a_restated_inertia_is_read_once(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_Nm": AXIS["torque"]})
+    (tmp_path / "README.md").write_text(
+        "motor + wave gen.  1.62e-4 kg m^2 at the motor shaft (= 1.62 kg m^2 at the joint)\n"
+        "arm                4.5 kg, centre of mass at 0.38 m, inertia about the axis 0.90 kg m^2\n"
+    )
+    told = draft_map(path, readme=tmp_path / "README.md").table.constants
+    found = {constant.value: one.value for constant, one in told.items()}
+    assert found == {"motor_inertia_kg_m2": 1.62e-4, "load_inertia_kg_m2": 0.9, "load_mass_kg": 4.5}
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("enc: motor encoder, 1.048.576 = 360 deg", ("", None)),  # points of thousands are doubtful
+        ("enc: motor angle in mrad, detent 1 = 7 mrad", ("mrad", None)),
+        ("enc: motor speed in rpm, 3000 = 10 V", ("rpm", None)),
+        ("enc: status, 1 = 0 V", ("", None)),
+        ("enc: recorded 2024 = 5 s", ("", None)),
+        ("enc: position counts, 10,000 counts = 360 deg", ("deg", 0.036)),
+    ],
+)
+def test_an_equation_that_is_no_size_is_left_alone(line: str, told: tuple[str, float | None]) -> None:
+    found = told_columns([f"- {line}", "- t: s", "- M: Nm"], ["enc", "t", "M"]).get("enc")
+    assert (("", None) if found is None else (found.unit, found.step)) == told
+
+
+def test_the_rest_of_a_line_with_a_whole_is_read(tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_%": AXIS["torque"] / 2.4 * 100.0}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(
+        "Motor: rated torque 2.4 Nm, rated current 4.5 A (= 100 %)\ntorque constant 0.6 Nm/A\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", ["rad", "counts"])
+def test_counts_of_a_second_encoder_are_those_of_whole_numbers(unit: str, tmp_path: Path) -> None:
+    """A unit of the file that is no count stands."""
+    joint = 0.1 * AXIS["angle"]
+    columns = {"t": AXIS["t"], "Pos": np.round(AXIS["angle"] / (2.0 * np.pi) * 65536), "M": AXIS["torque"]}
+    columns["Aux"] = joint if unit == "rad" else np.round(joint / (2.0 * np.pi) * 524288)
+    path = write(tmp_path / "log.csv", columns)
+    head, _, rest = path.read_text().partition("\n")
+    path.write_text(f"{head}\ns,counts,Nm,{unit}\n{rest}")
+    (tmp_path / "README.md").write_text(
+        "- Pos: motor encoder, 65536 counts per motor turn\n"
+        "- Aux: joint encoder at the output, 524288 counts per turn of the joint\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["table_position_m"], joint, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["The load was taken off. 12 kg", "Load mass: see sec. 4.5 kg", "motor 2.1 kg, arm 4.5 kg, inertia 0.9 kg m^2"],
+)
+def test_a_number_of_another_thing_is_no_inertia_of_a_part(line: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_Nm": AXIS["torque"]})
+    (tmp_path / "README.md").write_text(f"{line}\n")
+    told = {one.value for one in draft_map(path, readme=tmp_path / "README.md").table.constants}
+    assert not told & {"motor_inertia_kg_m2", "load_inertia_kg_m2"}
+    assert "arm" in line or not told

@@ -11,7 +11,7 @@ _PER_TURN = re.compile(
 _OF_COUNTS = re.compile(r"encoder|resolver|increment|inkrement|geber|codeur")
 _NO_COUNTS = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho|quadratur\w*|x ?4)\b")
 _PER_SECOND = re.compile(r"^ *(samples|rows|lines) ?(?:per|/) ?s(?:ec|\b)")
-_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) per (?:line|row)\b")
+_PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) (?:per (?:line|row)|apart)\b")
 _OF_FILE = re.compile(
     r"\b(file|rows?|sample (?:number|index|counter)|record\w*|header|separated|comma|tabs?)\b|\.\w{2,5}\b"
 )

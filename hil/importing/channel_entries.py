@@ -20,7 +20,7 @@ from hil.importing.relations import SAME_POSITION, derivative_of, driven, latene
 from hil.importing.roles import Roles, may_be_asked
 from hil.importing.speed_unit import speed_entry
 from hil.importing.unit_choice import MATCH, is_length, misfit, travel_per_unit
-from hil.importing.usual_values import LEADS_M, mixed_up, of_digits, usual_lead
+from hil.importing.usual_values import LEADS_M, mixed_up, usual_lead
 from hil.quantities import ROTARY_LEAD_M, UNITS
 
 SAME_COUNTS = 1e-3  # deviation of the factor between motor and set-point, both in counts: following errors are below
@@ -123,7 +123,7 @@ class ChannelEntries:
                 per_turn = abs(relations[length].factor) * UNITS[self.units[length]][1] / self.per_count
                 lead_m = 2.0 * pi * per_turn / UNITS[motor][1]
                 nominal = told is not None and abs(told.value / lead_m - 1.0) < MATCH
-                draft.lead_m = of_digits(told.value, lead_m) if told and nominal else float(f"{usual_lead(lead_m):.6g}")
+                draft.lead_m = told.value if told and nominal else float(f"{usual_lead(lead_m):.6g}")
                 draft.lead_how = f"travel of {length} per turn of {name}"
             elif told and (not roles.table or self.units[roles.table] == "counts"):
                 draft.lead_m, draft.lead_how = told.value, f"header of the file: {told.text}"

@@ -16,20 +16,12 @@ SURE_TURNS = 0.05  # deviation of a gear ratio from a whole number that is seldo
 LEADS_M = (0.010, 0.005, 0.020, 0.004, 0.016, 0.0025, 0.002, 0.025, 0.040, 0.008, 0.012, 0.032, 0.001)
 
 LEAST_M, MOST_M, MOST_RAD_S = 1e-6, 100.0, 1e5  # travel of a linear axis and speed of a rotary one: beyond is asked
-_ROUNDED = 4  # digits: of more a number is no nominal size
 
 
 def usual_lead(value_m: float) -> float:
     """The usual lead that is within 0.2 %, else the value itself [m]."""
     usual = next((lead for lead in LEADS_M if abs(value_m / lead - 1.0) < USUAL), None)
     return usual if usual is not None else value_m
-
-
-def of_digits(told: float, measured: float) -> float:
-    """The measured value if it is the one told but for its digits, 47.1239 for 47.12; few digits tell a nominal one."""
-    digits = len(f"{told:.10e}".partition("e")[0].replace(".", "").rstrip("0"))
-    rounded = digits >= _ROUNDED and float(f"{measured:.{digits}g}") == float(f"{told:.{digits}g}")
-    return float(f"{measured:.8g}") if rounded else told
 
 
 def screw_units(factor: float, far: str | None, motor: str | None) -> tuple[str, str] | None:

@@ -141,16 +141,6 @@ def test_a_number_of_another_thing_is_no_inertia_of_a_part(line: str, tmp_path: 
     assert "arm" in line or not told
 
 
-@pytest.mark.parametrize(("told", "lead_mm"), [("47.12", 47.1238898), ("47.11", 47.11), ("47", 47.0)])
-def test_a_lead_of_many_digits_is_rounded(told: str, lead_mm: float, tmp_path: Path) -> None:
-    """The measured one is taken if it is the same but for the digits; else the encoders differ by a lead error."""
-    columns = {"t_s": AXIS["t"], "motor_deg": np.degrees(AXIS["angle"]), "trq_Nm": AXIS["torque"]}
-    columns["tape_mm"] = np.round(7.5 * AXIS["angle"], 3)
-    path = write(tmp_path / "log.csv", columns)
-    (tmp_path / "README.md").write_text(f"Belt module, {told} mm per motor turn.\n")
-    assert draft_map(path, readme=tmp_path / "README.md").lead_m == pytest.approx(1e-3 * lead_mm, rel=1e-5)
-
-
 def test_samples_apart_tell_the_rate_of_a_file_without_a_header(tmp_path: Path) -> None:
     columns = np.column_stack([np.arange(AXIS["t"].size), np.degrees(AXIS["angle"]), AXIS["torque"]])
     np.savetxt(tmp_path / "trace.csv", columns, delimiter=",", fmt="%.6f")

@@ -11,8 +11,8 @@ from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.stages import Judged, Prepared, Progress
 from hil.diagnosis.time_left import usual_budget_s, with_time_left
-from hil.diagnosis.verdict.held_out import test_on_held_out
 from hil.diagnosis.verdict.judge import judge
+from hil.diagnosis.verdict.middle_held_out import test_inside_time
 from hil.diagnosis.verdict.reproduction import behind_plain, with_less_torque
 from hil.errors import InputError
 from hil.identification.parallel import one_blas_thread
@@ -50,7 +50,7 @@ def diagnose(
             progress("searching again without a delay of the torque that is left open")
             searched = search(at_once, progress, end_s)
         progress("testing on held-out recordings")
-        return judge(test_on_held_out(searched))
+        return judge(test_inside_time(searched))
 
     judged = answer(prepared)
     for simpler in (as_one_inertia, as_plant_alone):

@@ -12,12 +12,18 @@ from hil.quantities import digits, known_quantity, quantity, reading_unit, unit_
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
 
-FIRST_PART, LAST_PART = "first part", "last part"  # of a recording of which one is held out
+FIRST_PART, MIDDLE_PART, LAST_PART = "first part", "middle part", "last part"  # of a recording; one is held out
+HELD_OUT_NOTE = "No held-out recording was given:"
 
 
 def whole_name(name: str) -> str:
     """Name of the recording of which one with this name may be a part."""
-    return name.removesuffix(f" ({FIRST_PART})").removesuffix(f" ({LAST_PART})")
+    return name.removesuffix(f" ({part})") if (part := part_of(name)) else name
+
+
+def part_of(name: str) -> str:
+    """The part of a recording that has this name; empty for a whole one."""
+    return next((part for part in (FIRST_PART, MIDDLE_PART, LAST_PART) if name.endswith(f" ({part})")), "")
 
 
 def title(effect: str) -> str:

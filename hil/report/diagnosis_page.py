@@ -11,7 +11,7 @@ from hil.diagnosis.pictures.structure import CAPTION as CAPTION_OF_STRUCTURE
 from hil.diagnosis.pictures.structure import structure_figure
 from hil.diagnosis.result import AT_FLOOR, Verdict
 from hil.diagnosis.statement import explained
-from hil.diagnosis.wording import titles, where, whole_name
+from hil.diagnosis.wording import part_of, titles, where, whole_name
 from hil.figures.drawing import save
 from hil.importing.own_units import COUNT_AS
 from hil.quantities import digits, percent, reading_unit
@@ -98,7 +98,8 @@ def _lead(diagnosis: Diagnosis) -> str:
     seconds = sum(run.motor.size * run.period_s for run in diagnosis.train.runs)
     whole = {whole_name(run.name) for run in diagnosis.train.runs}
     held_out = ", ".join(
-        "its last part" if whole == {whole_name(run.name)} else run.name for run in diagnosis.held_out.runs
+        f"its {part}" if whole == {whole_name(run.name)} and (part := part_of(run.name)) else run.name
+        for run in diagnosis.held_out.runs
     )
     held_out = held_out or "nothing"
     bench = f"bench {diagnosis.given_bench.name} ({diagnosis.given_bench.axis.model})"

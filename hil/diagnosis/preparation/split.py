@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.diagnosis.wording import FIRST_PART, LAST_PART
+from hil.diagnosis.wording import FIRST_PART, HELD_OUT_NOTE, LAST_PART
 from hil.identification.measured import LEAD_IN
 from hil.recording.recording import Recording
 
@@ -68,7 +68,7 @@ def _led_in(recording: Recording, part: Recording) -> Recording:
 def held_out_note(held_out: Sequence[Recording]) -> str:
     """Sentence on the parts that `split` holds out."""
     first = [one.name for one in held_out if one.name.endswith(f"({FIRST_PART})")]
-    text = "No held-out recording was given: the last part of each recording is used for validation"
+    text = f"{HELD_OUT_NOTE} the last part of each recording is used for validation"
     return (
         f"{text}, but {', '.join(first)}, since the rest alone reaches its speed and travel." if first else f"{text}."
     )

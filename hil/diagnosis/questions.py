@@ -11,7 +11,7 @@ from hil.diagnosis.result import CLOCK, MOMENT
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
-from hil.identification.intended_motion import measured_motion
+from hil.identification.intended_motion import intended_motion, measured_motion
 from hil.identification.least_squares import Columns
 from hil.identification.periods import refined_period, strongest_periods
 from hil.identification.plain_model import PlainModel, plain_columns
@@ -49,8 +49,12 @@ class Question:
 
 
 def everywhere(hypothesis: Hypothesis, data: Dataset, plain: PlainModel) -> list[Question]:
-    """Quantities that mean the same in every recording."""
-    motions = [measured_motion(run).moved for run in data.runs]
+    """Quantities that mean the same in every recording, of the intended motion.
+
+    The measured speed moves with the disturbances of the loop, which the residual has, too: it would sort the rows of a
+    constant feed by them.
+    """
+    motions = [intended_motion(run) for run in data.runs]
     axis, ratio = hypothesis.bench.axis, hypothesis.bench.axis.ratio_m_rad
     length = "rad" if axis.turns else "m"
     speed = [ratio * moved.velocity for moved in motions]

@@ -22,6 +22,7 @@ BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as man
 _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
 _DECAYED = 0.05  # of the variance: the correlation time ends there
 _NARROWEST = 0.2  # bin, over one of equal width
+_CHATTER = 3  # crossings of an edge by a quantity that comes near it: it may turn there; more are its noise
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 
@@ -59,8 +60,9 @@ class Structure:
 def structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], bins: int = BINS) -> Structure | None:
     """Structure of residuals over a quantity, (n,) for each part, in as many bins as there are independent rows for.
 
-    None where these are too few. Bins have equally many rows, but are not narrower than a fifth of equal ones: what a
-    plateau of the quantity has within it is the pattern of its counts.
+    None where these are too few. Bins have equally many rows, but are not narrower than a fifth of equal ones, and no
+    edge is within a plateau of the quantity: which of its rows are beyond is the pattern of its counts, and the noise
+    of a loop, which the residual has, too.
     """
     few = sum(np.count_nonzero(part.rows) for part in parts) < bins
     while bins > 1 and not few:
@@ -75,7 +77,7 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
     values = np.concatenate([one[part.rows] for one, part in zip(quantity, parts, strict=True)])
     if values.size < bins or not np.isfinite(values).all():
         return None
-    edges = _edges(values, bins)
+    edges = _edges([one[part.rows] for one, part in zip(quantity, parts, strict=True)], values, bins)
     count = edges.size - 1
     if count < 2:
         return None
@@ -137,15 +139,27 @@ def autocovariance(parts: Sequence[ResidualSeries]) -> FloatArray:
     return np.asarray(covariance[:length] * (1.0 - np.arange(length) / length))
 
 
-def _edges(values: FloatArray, bins: int) -> FloatArray:
-    """Edges (K + 1,) of at most so many bins."""
+def _edges(quantity: Sequence[FloatArray], values: FloatArray, bins: int) -> FloatArray:
+    """Edges (K + 1,) of at most so many bins of a quantity, (n,) for each part, all of whose `values` are given."""
     wanted = np.quantile(values, np.linspace(0.0, 1.0, bins + 1))
     least = _NARROWEST * (wanted[-1] - wanted[0]) / bins
     kept = [wanted[0]]
     for edge in wanted[1:-1]:
-        if edge - kept[-1] > least and wanted[-1] - edge > least:
+        if edge - kept[-1] > least and wanted[-1] - edge > least and _passes(quantity, edge, least):
             kept.append(edge)
     return np.array([*kept, wanted[-1]])
+
+
+def _passes(quantity: Sequence[FloatArray], edge: float, near: float) -> bool:
+    """True if a quantity that comes `near` an edge passes it, and does not go to and fro over it."""
+    crossed = visits = 0
+    for one in quantity:
+        beyond, close = one >= edge, np.abs(one - edge) < near
+        changes = np.diff(beyond)
+        crossed += int(np.count_nonzero(changes))
+        visits += int(np.count_nonzero(close[:1]) + np.count_nonzero(close[1:] & ~close[:-1]))
+        visits += int(np.count_nonzero(changes & ~close[1:] & ~close[:-1]))
+    return crossed <= _CHATTER * visits
 
 
 def _bin(quantity: FloatArray, edges: FloatArray) -> NDArray[np.intp]:

@@ -59,11 +59,12 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
         told = {name: _as_angle(table, name, one) if name != motor else one for name, one in told.items()}
-    firm = {name: one.unit for name, one in told.items() if one.per_turn and one.step}
-    steps = {name: one.step for name, one in told.items() if one.step and (name in firm or name not in table.units)}
+    firm = {name: one.unit for name, one in told.items() if (one.per_turn or one.of) and one.step}
+    units = {name: unit for name, unit in table.units.items() if name not in told or unit_named(unit)}
+    steps = {name: one.step for name, one in told.items() if one.step and (name in firm or name not in units)}
     return replace(
         table,
-        units={name: one.unit for name, one in told.items() if one.unit} | table.units,
+        units={name: one.unit for name, one in told.items() if one.unit} | units,
         scales={name: (step, 0.0) for name, step in steps.items()} | table.scales,
         firm_units=firm,
         words={name: one.words for name, one in told.items() if one.words} | table.words,
@@ -106,4 +107,7 @@ def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
         return False
     if told.step is None:
         return True
+    if told.of:
+        named = unit_named(table.units.get(name, "")) or label(table.titles.get(name, name)).unit
+        return named in (None, told.of)
     return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

@@ -10,15 +10,18 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hil.importing.lexicon import lexicon, without_accents
-from hil.importing.units import factor_and_unit, unit_named
+from hil.importing.lexicon import Quantity, lexicon, without_accents
+from hil.importing.units import QUANTITY_OF_UNIT, factor_and_unit, unit_named
 
 _WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
 _BEHIND_NAME = r"(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|\t\s*|\s*(?=[\[(]))"
 _NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)(.*)")
-_PHRASES = re.compile(r"[;()\[\]]|,(?!\d)")
+_PHRASES = re.compile(r"[;()\[\]]|,(?!\d)|:\s")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
 _EQUAL = re.compile(r"(\d+(?:,\d{3})*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)")
+_PER_VOLT = re.compile(
+    r"(?<![\d.,])(?P<size>\d+(?:[.,]\d+)?)\s*(?P<unit>[^\W\d][^\d/,;=]*?)\s*(?:/|\bper\b)\s*(?P<own>m?V)\b"
+)
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
 _PER_TURN = re.compile(  # 65536 counts per motor turn
@@ -28,16 +31,21 @@ _PER_TURN = re.compile(  # 65536 counts per motor turn
 )
 _CELLS = re.compile(r"\s*\|(.+)\|\s*")  # a row of a table
 _NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
+_SENTENCE = re.compile(r"[.]\s+(?=[^\W\d_a-z])")  # a capital follows
 _FEWEST = 3  # columns that a sentence lists: fewer are words
 
 
 class ToldColumn(NamedTuple):
-    """Words and unit of a column, "" without; a count is `step` units, and a turn has `per_turn` counts, where told."""
+    """Words and unit of a column, "" without; a count is `step` units, and a turn has `per_turn` counts, where told.
+
+    `of`: the unit of the column itself, such as V, of which `step` is the factor to `unit`; "" where it has counts.
+    """
 
     words: str
     unit: str
     step: float | None = None
     per_turn: int | None = None
+    of: str = ""
 
 
 def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldColumn]:
@@ -92,12 +100,15 @@ def _mentions(line: str, names: Sequence[str]) -> list[tuple[str, bool, str]]:
         within = None
         if not match and re.search(r"[\d_]", name) and len(name) > 1:
             within = re.search(rf"(?<![\w.-]){own}(?![\w-])", line)
+        elif not match:
+            within = re.search(rf"(?:^|[.]\s+){own} (?=in )", line)  # a sentence of it: I act in digits
         places += [(one.start(), one.end(), name, one is match) for one in (match or within,) if one]
     places.sort()
     ends = [*(place[0] for place in places), len(line)][1:]
+    texts = [line[begin:end] for (_, begin, _, _), end in zip(places, ends, strict=False)]
     return [
-        (name, begins, line[begin:end].strip(" :=-–,;\t"))
-        for (_, begin, name, begins), end in zip(places, ends, strict=False)
+        (name, begins, (text if begins else _SENTENCE.split(text)[0]).strip(" :=-–,;.\t"))
+        for (_, _, name, begins), text in zip(places, texts, strict=True)
     ]
 
 
@@ -115,6 +126,10 @@ def _of_both(text: str) -> ToldColumn | None:
 def _told(text: str) -> ToldColumn:
     """Words, unit and step of what is said of a column. A plain unit goes before the size of a count."""
     phrases = _phrases(text)
+    if volt := _PER_VOLT.search(text):
+        unit = unit_named(volt["unit"])
+        if unit and QUANTITY_OF_UNIT.get(unit) is Quantity.EFFORT:
+            return ToldColumn(phrases[0], unit, float(volt["size"].replace(",", ".")), of=volt["own"])
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
     equal = next(filter(None, map(_equal, phrases)), None)
     if equal and (not unit or unit_named(unit) in ("counts", "%", "permille")):
@@ -131,10 +146,10 @@ def _told(text: str) -> ToldColumn:
 
 
 def _equal(phrase: str) -> tuple[float, str] | None:
-    """Size and unit of a count, told by an equation: 1000 = 3.2 Nm, 1 count = 2 um; None without one."""
+    """Size and unit of a count, told by an equation: 1000 = 3.2 Nm, 16384 digits = 16 A; None without one."""
     match = _EQUAL.fullmatch(phrase)
     whole, own, size, unit = match.groups() if match else ("", "", "", "")
-    if not (match and _is_unit(unit) and (not own or unit_named(own) == "counts")):
+    if not (match and _is_unit(unit) and unit_named(own) in (None, "counts")):
         return None
     many, value = float(whole.replace(",", "")), float(size.replace(",", "."))
     return (value / many, unit) if many and value else None
@@ -160,12 +175,13 @@ def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:
 def _in_a_row(text: str, names: Sequence[str]) -> dict[str, ToldColumn]:
     """The same of columns that a sentence lists: "angle = table angle in degrees (0.001 deg), iq = current in A".
 
-    Without signs between them they are in the order of the file: "t in s, q motor angle in degrees, M torque in Nm".
+    Without signs between them they are in the order of the file: "t in s, q motor angle in degrees, M torque in Nm", or
+    "t (s), q (rad, joint side), M (Nm)".
     """
     places = [(match, name) for name in names if (match := re.search(rf"(?<!\w){re.escape(name)} = ", text))]
     places.sort(key=lambda place: place[0].start())
     if not places:
-        found = [(re.search(rf"(?:^|[,;:.]\s+){re.escape(name)}\s+(?=\w)", text), name) for name in names]
+        found = [(re.search(rf"(?:^|[,;:.]\s+){re.escape(name)}\s+(?=[\w(])", text), name) for name in names]
         places = [(match, name) for match, name in found if match]
         begins = [match.start() for match, _ in places]
         if len(places) < max(len(names), _FEWEST) or begins != sorted(begins):

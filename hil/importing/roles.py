@@ -21,6 +21,7 @@ from hil.importing.unnamed_columns import quantities_by_relations
 from hil.quantities import UNITS
 from hil.recording.quantum import count_of
 
+_EVEN = 0.1  # deviation of a constant speed over its mean, at most
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 _ALONE = "a set-point of the velocity; the control law is read from set-points of the position"
 _NO_ROLE = {
@@ -78,7 +79,7 @@ def find_roles(
     roles.left_out |= {name: f"constant at {columns[name][0]:g}" for name in frozen}
     labels = {name: label for name, label in labels.items() if name not in frozen}
     live = {name: columns[name] for name in columns if name in labels}
-    counters = [name for name in live if labels[name].quantity is not Quantity.TIME and rises_evenly(live[name])]
+    counters = [name for name in live if _may_count(labels[name]) and rises_evenly(live[name])]
     roles.left_out |= dict.fromkeys(counters, COUNTER)
     labels |= {name: replace(labels[name], quantity=Quantity.OTHER) for name in counters}
     labels, roles.how = quantities_by_relations(live, labels, period_s)
@@ -114,6 +115,13 @@ def find_roles(
             "it with the torque"
         )
     return roles
+
+
+def _may_count(label: Label) -> bool:
+    """True unless name and unit say that a column is a position, which rises evenly at constant speed."""
+    return label.quantity is not Quantity.TIME and (
+        label.quantity is not Quantity.POSITION or label.unit in (None, "", "counts")
+    )
 
 
 def may_be_asked(columns: dict[str, FloatArray], labels: dict[str, Label], used: Collection[str] = ()) -> list[str]:
@@ -258,8 +266,10 @@ def _velocities(
     roles.velocity_command = commands[0] if commands else None
     roles.left_out |= dict.fromkeys(commands[1:], "another set-point of the velocity")
     for name in measured:
-        share = derivative_of(live[name], moved, period_s).share
         roles.left_out[name] = "velocity of the motion, follows from the position"
+        if np.std(moved.velocity) < _EVEN * abs(float(np.mean(moved.velocity))):
+            continue  # at constant speed the noise of both is all that differs
+        share = derivative_of(live[name], moved, period_s).share
         if share < 0.5:
             inverse = derivative_of(live[roles.motor], motion(live[name], period_s), period_s).share
             if inverse > IS_DERIVATIVE:

@@ -18,8 +18,20 @@ def is_decimal(step: float, tolerance: float = DIGITS) -> bool:
 
 
 def count_of(values: FloatArray) -> float | None:
-    """Step of a quantised channel (n,) in its unit; None where differences are no multiples of one step."""
-    differences = np.abs(np.diff(values))
+    """Step of a quantised channel (n,) in its unit; None where differences are no multiples of one step.
+
+    At a constant speed all differences from row to row are one multiple; there those between them tell the step.
+    """
+    changes = np.diff(values)
+    step = _step(changes, values)
+    if step is None or np.ptp(np.round(np.abs(changes) / step)) > 0.0:
+        return step
+    return _step(np.diff(changes), values)
+
+
+def _step(changes: FloatArray, values: FloatArray) -> float | None:
+    """Step of which changes (m,) of values (n,) are multiples."""
+    differences = np.abs(changes)
     differences = differences[differences > 1e-12 * np.ptp(values)]
     if differences.size < 100:
         return None

@@ -180,7 +180,7 @@ def test_a_list_has_units_in_brackets_and_sizes_of_counts() -> None:
         "- mot_inc: motor encoder, 65536 increments per motor turn",
     ]
     names = ["lage_soll", "motormoment", "coppia_permille", "S-0-0047", "S-0-0051", "S-0-0040", "mot_inc"]
-    told = {name: (unit, step) for name, (_, unit, step, _) in told_columns(lines, names).items()}
+    told = {name: (unit, step) for name, (_, unit, step, *_) in told_columns(lines, names).items()}
     assert told == {
         "lage_soll": ("mm", None),
         "motormoment": ("Nm", None),

@@ -33,7 +33,7 @@ $(INSTALLED): requirements.lock pyproject.toml
 test: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
+	$(BIN)/hil warm-up & compiling=$$!; $(BIN)/mypy && wait $$compiling
 	$(BIN)/lint-imports
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -m "not long and not net"
 

@@ -24,7 +24,7 @@ def count_of(values: FloatArray) -> float | None:
     """
     changes = np.diff(values)
     step = _step(changes, values)
-    if step is None or np.ptp(np.round(np.abs(changes) / step)) > 0.0:
+    if step is None or np.ptp(np.round(changes / step)) > 0.0:
         return step
     return _step(np.diff(changes), values)
 

@@ -117,6 +117,7 @@ def test_mypy_and_python_refuse_an_incomplete_implementation(tmp_path: Path, por
         exec(source, {})
 
 
+@pytest.mark.long
 def test_mypy_accepts_the_second_protocol() -> None:
     checked = mypy(Path(__file__).parent / "ascii_drive.py")
     assert checked.returncode == 0, checked.stdout

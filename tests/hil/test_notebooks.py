@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
-QUICK = ("3_compare_and_fit", "5_friction")  # without a diagnosis
+QUICK = ("5_friction",)  # without a diagnosis
 LONGEST_S = 1800  # of a cell: a diagnosis on a machine in use, its kernels compiled first
 MOST_BYTES = 300_000  # of what a cell shows
 

@@ -89,6 +89,7 @@ def test_an_option_of_another_draft_is_refused_where_a_map_is(explained: tuple[P
     assert "axis-map.yaml: it is there already and was not drafted with --rate 500" in ran.stderr.replace("\n", " ")
 
 
+@pytest.mark.long
 def test_files_of_one_name_and_other_units_have_a_map_each(tmp_path: Path) -> None:
     for name, unit, factor in (("first", "[Nm]", 1.0), ("second", "[mNm]", 1e3)):
         (tmp_path / name).mkdir()
@@ -101,6 +102,7 @@ def test_files_of_one_name_and_other_units_have_a_map_each(tmp_path: Path) -> No
     }
 
 
+@pytest.mark.long
 def test_files_whose_sizes_are_found_with_errors_share_a_map(tmp_path: Path) -> None:
     """Counts per revolution are found by a speed beside them: 3977 in both files, within the noise of the speed."""
     columns, names = axis(5000), []
@@ -131,6 +133,7 @@ def test_numbers_without_a_unit_count_as_they_are_and_the_page_says_so(tmp_path:
     assert '<div class="verdict warning">The size of a channel is not known' in page
 
 
+@pytest.mark.long
 def test_a_doubt_about_a_map_is_told_until_it_is_settled(tmp_path: Path) -> None:
     written(tmp_path, "", 10.0)
     assert hil(tmp_path, "explain", "axis.csv", "--budget", "5").returncode == 0
@@ -148,6 +151,7 @@ def test_a_doubt_about_a_map_is_told_until_it_is_settled(tmp_path: Path) -> None
     assert printed(corrected.stdout, "inertia_kg_m2") == pytest.approx(INERTIA_KG_M2, rel=0.02)
 
 
+@pytest.mark.long
 def test_the_rate_of_a_first_run_is_read_from_the_map(tmp_path: Path) -> None:
     """The file has neither time stamps nor a unit of its torque; a second run, without the option, tells it too."""
     columns = axis(2500)

@@ -98,6 +98,7 @@ def test_positions_coarser_than_those_of_the_loop_are_no_mismatch() -> None:
 SET_POINTS = {"position_command_m": None, "velocity_command_m_s": None}
 
 
+@pytest.mark.long
 def test_without_a_control_law_a_cause_is_named_from_the_torque(tmp_path: Path) -> None:
     recording = changed(laps(COGGING), **SET_POINTS, torque_command_n_m=None)
     found = diagnose([recording], [], OWNER.model_copy(update={"control": UnknownControl(law="unknown")}))

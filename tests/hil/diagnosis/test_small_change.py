@@ -31,6 +31,7 @@ def recorded(folder: Path, inertia: np.ndarray, friction_n_m: np.ndarray) -> Pat
     return write(folder / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
 
 
+@pytest.mark.long
 def test_a_load_that_is_put_on_is_told_with_its_moment(tmp_path: Path) -> None:
     heavier = np.where(np.arange(ROWS) < AT, 1.0, HEAVIER) * INERTIA_KG_M2
     found = explain([recorded(tmp_path, heavier, np.full(ROWS, COULOMB_N_M))], tmp_path / "out").diagnosis
@@ -101,6 +102,7 @@ def test_a_change_of_friction_is_seen_at_one_speed_too(tmp_path: Path) -> None:
     assert any("from 9.0" in one and "friction is" in one and "larger than before" in one for one in told)
 
 
+@pytest.mark.long
 def test_a_weight_that_the_bench_has_not_may_change_at_a_moment(tmp_path: Path) -> None:
     """A weight throughout, and more of it and of the inertia from a moment on: its value in each part is told."""
     after = np.arange(ROWS) >= AT
@@ -119,6 +121,7 @@ def test_a_weight_that_the_bench_has_not_may_change_at_a_moment(tmp_path: Path) 
     assert abs(float(np.median(panel.lines[0].get_ydata()))) < 0.5
 
 
+@pytest.mark.long
 def test_rows_that_a_logger_lost_are_a_shift_of_the_clocks(tmp_path: Path) -> None:
     """The torque is early by 9 rows from a moment on: nothing of the axis changed."""
     columns = axis(ROWS + 9)

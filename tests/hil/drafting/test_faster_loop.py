@@ -44,7 +44,7 @@ def drafted(folder: Path, table: dict[str, np.ndarray]) -> tuple[Bench, str]:
     return load_bench(folder / "axis.yaml"), (folder / "axis.yaml").read_text()
 
 
-@pytest.mark.parametrize(("ticks", "known"), [(1, True), (2, False)])
+@pytest.mark.parametrize(("ticks", "known"), [pytest.param(1, True, marks=pytest.mark.long), (2, False)])
 def test_a_law_whose_torque_is_not_held_between_rows_is_not_simulated(tmp_path: Path, ticks: int, known: bool) -> None:
     bench, text = drafted(tmp_path, servo(ticks))
     assert bench.law_known is known
@@ -56,7 +56,7 @@ def test_a_law_whose_torque_is_not_held_between_rows_is_not_simulated(tmp_path: 
         assert float(gain) == pytest.approx(POSITION_GAIN_1_S, rel=0.05)
 
 
-@pytest.mark.parametrize("both", [False, True])
+@pytest.mark.parametrize("both", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_law_of_a_late_torque_is_that_of_its_command(tmp_path: Path, both: bool) -> None:
     """Without the command the lateness is in the bench, and the gains are told beside it."""
     table = servo(1)

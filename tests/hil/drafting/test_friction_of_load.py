@@ -56,6 +56,7 @@ def test_the_owner_s_load_is_held_and_splits_the_sum(told: tuple[Path, Bench]) -
     assert shares(bench) == pytest.approx((18.0 / 24.0, 30.0 / 40.0), abs=0.15)
 
 
+@pytest.mark.long
 def test_without_the_owner_the_split_is_half(tmp_path: Path, recorded: dict[str, np.ndarray]) -> None:
     bench = drafted(tmp_path, recorded, "Belt axis, 62.832 mm per motor turn.\n")
     assert not bench.axis.held

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import pytest
 from processes import is_over, wait_for
 
 from hil.fleet.engine import Engine
@@ -38,6 +39,7 @@ def workers_of(client: subprocess.Popen[str]) -> list[int]:
     return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
 
 
+@pytest.mark.long
 def test_a_killed_worker_and_a_killed_client_lose_nothing(fleet: Path, tmp_path: Path) -> None:
     for at, path in enumerate(sorted(fleet.rglob("*.parquet"))):
         original = path.rename(path.with_name(f"2025-01-01_10{at:02d}.parquet"))

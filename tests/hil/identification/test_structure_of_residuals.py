@@ -50,6 +50,29 @@ def test_a_bend_below_the_noise_is_found(pole: float, size: float) -> None:
     assert found.energy == pytest.approx(np.var(bend), rel=0.4)
 
 
+def plateaus(seed: int) -> tuple[FloatArray, FloatArray]:
+    """A quantity (n,) of random levels for 150 rows each, and the noise of a loop that is in it and in the residual."""
+    random = np.random.default_rng(seed)
+    levels = np.repeat(random.choice([-2.0, -0.95, 1.0, 1.7, 2.4], ROWS // 150), 150)
+    return levels, slow_noise(seed + 1000, 0.9)
+
+
+def test_noise_of_the_quantity_within_a_plateau_is_no_structure() -> None:
+    alarms = 0
+    for seed in range(60):
+        levels, loop = plateaus(seed)
+        found = structure(series(slow_noise(seed, 0.97) + loop), [levels + 0.03 * loop])
+        alarms += found is not None and found.p < 0.01
+    assert alarms <= 4  # of 60 at 1 %: more in 1 of 2000 draws; most with edges in the plateaus
+
+
+def test_levels_that_differ_are_structure() -> None:
+    levels, loop = plateaus(3)
+    found = structure(series(0.5 * (levels > 1.5) + slow_noise(3, 0.9) + loop), [levels + 0.03 * loop])
+    assert found is not None
+    assert found.p < 1e-3
+
+
 def test_the_map_predicts_other_rows() -> None:
     x = swing()
     found = structure(series(np.sign(x) + 0.1 * slow_noise(2, 0.5)), [x])

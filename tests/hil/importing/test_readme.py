@@ -75,6 +75,7 @@ def test_a_readme_that_is_not_there_is_refused(source: Path, tmp_path: Path) -> 
         draft_map(source, readme=tmp_path / "none.txt")
 
 
+@pytest.mark.long
 def test_a_map_knows_the_readme_that_it_was_drafted_with(readme: Path, tmp_path: Path) -> None:
     source = write(tmp_path / "log.csv", COLUMNS)
     first = explain(source, tmp_path / "explained", readme=readme)

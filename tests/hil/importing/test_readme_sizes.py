@@ -149,3 +149,32 @@ def test_samples_apart_tell_the_rate_of_a_file_without_a_header(tmp_path: Path) 
     )
     import_(tmp_path / "trace.csv", None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
     assert read_recording(tmp_path / "out.parquet").period_s == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "size"),
+    [
+        ("torque_V   amplifier output of the torque shaft, 2 Nm/V, 12 bit", 2.0),
+        ("torque_V: torque shaft, 0.5 N m per V", 0.5),
+    ],
+)
+def test_a_ratio_to_volts_is_the_scale_of_a_column_in_volts(line: str, size: float, tmp_path: Path) -> None:
+    """It is a measured torque then, and no command in volts."""
+    columns = {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "torque_V": AXIS["torque"] / size}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(f"- pos_rad: rad\n{line}\nThe brake needs 8 Nm/V.\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
+
+
+def test_sentences_tell_columns_whose_names_are_words() -> None:
+    lines = ["Pos act in mm. I act in drive digits: 16384 digits = 16 A. Positive current pushes.", "1 turn = 5 mm."]
+    told = told_columns(lines, ["Idx", "Pos act", "I act"])
+    assert told["Pos act"].unit == "mm"
+    assert (told["I act"].unit, told["I act"].step) == ("A", 16.0 / 16384.0)
+
+
+def test_a_sentence_lists_columns_with_units_in_brackets() -> None:
+    lines = ["Columns: stamp_ns (unix ns, wobbling), position (rad, joint side, 4096 counts / motor rev), current (A)."]
+    told = told_columns(lines, ["stamp_ns", "position", "current"])
+    assert {name: one.unit for name, one in told.items()} == {"stamp_ns": "ns", "position": "rad", "current": "A"}

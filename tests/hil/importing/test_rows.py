@@ -148,6 +148,7 @@ def test_rest_and_coarse_counts_are_no_repetitions() -> None:
         (np.mod(8 * COUNTS + 32768, 65536) - 32768, 65536.0),
         (np.mod(np.rad2deg(ANGLE), 360.0), 360.0),
         (np.mod(ANGLE + np.pi, 2 * np.pi) - np.pi, 2 * np.pi),
+        (np.mod(np.cumsum(66.0 + RANDOM.normal(0.0, 0.3, 600)), 360.0), 360.0),  # 2200 rpm in rows of 5 ms
     ],
 )
 def test_a_wrap_is_found_with_its_range(values: np.ndarray, size: float | None) -> None:
@@ -164,6 +165,7 @@ def test_a_wrap_is_found_with_its_range(values: np.ndarray, size: float | None) 
         np.where(np.arange(T.size) == 800, -9999.0, ANGLE),  # a placeholder
         np.where(T > 2.0, ANGLE + 500.0, ANGLE),  # a jump
         RANDOM.normal(size=T.size),
+        RANDOM.uniform(0.0, 360.0, T.size),
         ANGLE,
     ],
 )

@@ -17,7 +17,7 @@ from hil.manual.topics import FOLDER, GUIDE, TOPICS, for_terminal, guide_page, t
 
 SLOW = re.compile(
     r"hil (demo|explain|diagnose|investigate|compare|identify|fleet)\b|--seconds|hil\.diagnose"
-    r"|profiles/(positioning|circle)"
+    r"|compensate|profiles/(positioning|circle|frequency_response)"
 )
 
 

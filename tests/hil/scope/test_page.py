@@ -213,6 +213,7 @@ def test_the_page_goes_on_after_the_bench_is_started_anew(page: Page, bench: Ben
     page.until(f"{NEWEST} > {newest}")
 
 
+@pytest.mark.long
 def test_two_recordings_over_each_other_and_a_replay(folder: Path) -> None:
     record(folder, bench_with(), "one")
     record(folder, bench_with({"effects": []}), "two")

@@ -185,6 +185,7 @@ def test_the_same_again_goes_on_when_a_process_is_killed(sealed: Path, tmp_path:
     assert sorted(said.split() + again.split()) == [case.name for case in PLANNED]
 
 
+@pytest.mark.long
 def test_failures_are_answers_on_a_cluster_too(sealed: Path, tmp_path: Path, start: Callable[[], Cluster]) -> None:
     """Cases that cannot be diagnosed, so that the way there and back is quick."""
     for name in ("one", "two"):

@@ -87,6 +87,7 @@ def test_without_pysindy_the_message_says_what_to_do(case: PeerCase, monkeypatch
     assert raised.value.exit_code == 1
 
 
+@pytest.mark.long
 def test_the_command_has_each_method_answer_every_case_once(folder: Path, tmp_path: Path) -> None:
     command = [
         sys.executable,

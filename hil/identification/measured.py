@@ -23,6 +23,7 @@ from hil.errors import InputError
 from hil.identification.derived_channels import completed
 from hil.identification.laps import Laps, find_laps
 from hil.identification.observability import Observability, observability
+from hil.identification.parabola import first_step
 from hil.identification.sensor_noise import Noise, estimate_noise, moving, white_noise
 from hil.recording.recording import Recording
 from hil.recording.stamps import check_finite
@@ -34,7 +35,7 @@ SETTLE_S = 0.05  # not evaluated at the start: several time constants of the obs
 SETTLE_IN_MOTION_S = 0.3  # modes of a machine axis have decayed
 LEAD_IN = "lead_in_rows"  # metadata: rows at the start that belong to another part and only give the twin its state
 _REPLAYED_ROWS = 200  # to find the phase of the position loop: many of its ticks
-_FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity: averages encoder counts
+_FITTED_ROWS = 11  # motor positions fitted by a parabola for the first velocity, at most: averages encoder counts
 
 
 _CHANNELS = (
@@ -183,7 +184,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     known = observability(recording, bench)
     if not known.position_measured:
         noise = replace(noise, motor=recording.period_s * white_noise(_column(recording, names.motor_velocity)))
-    start = _start(gains, (position, velocity, motor, feedback), own)
+    start = _start(gains, (position, velocity, motor, feedback), own, noise.motor)
     return Measured(
         name=recording.name,
         kind=recording.kind,
@@ -287,13 +288,9 @@ def _state_at(gains: cascade.Gains, channels: Channels, command: FloatArray, row
     return state._replace(integral_n_m=float(command[row] - proportional[0]))
 
 
-def _start(gains: cascade.Gains, channels: Channels, command: FloatArray) -> Start:
+def _start(gains: cascade.Gains, channels: Channels, command: FloatArray, noise_rad: float) -> Start:
     """Initial position and velocity from a parabola through the first rows, and the torque of the integrator."""
     motor = channels[2]
-    rows = motor[:_FITTED_ROWS]
-    speed = 0.0
-    if np.ptp(rows) > 0.0:  # at rest the polynomial would give rounding errors
-        curve, slope, _ = np.polyfit(np.arange(rows.size), rows, 2)
-        speed = float(slope - curve) / gains.period_s  # backward difference, as the controller takes it
+    speed = first_step(motor[:_FITTED_ROWS], noise_rad) / gains.period_s
     state = _state_at(gains, channels, command, 0, speed)
     return Start(float(gains.ratio_m_rad * motor[0]), gains.ratio_m_rad * speed, state.integral_n_m)

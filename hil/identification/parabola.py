@@ -1,6 +1,7 @@
-"""Filter of Savitzky and Golay with a parabola: `scipy.signal.savgol_filter` of order 2 to the last bit.
+"""Parabolas through rows: the filter of Savitzky and Golay, and the step by which the first rows begin.
 
-Of its own because `scipy.signal` takes most of a second to load, which a first look at a file must not wait for.
+The filter is `scipy.signal.savgol_filter` of order 2 to the last bit. `scipy.signal` itself takes most of a second to
+load, which a first look at a file must not wait for.
 """
 
 from math import factorial
@@ -11,6 +12,8 @@ from scipy.ndimage import convolve1d
 from hil.arrays import FloatArray
 
 _ORDER = 2
+_FEWEST = 3  # rows of a parabola, through which there is always one
+_FITS = 3.0  # times the noise, that a parabola leaves at most
 
 
 def parabola_weights(rows: int, derivative: int, period_s: float = 1.0) -> FloatArray:
@@ -31,3 +34,19 @@ def parabola_filter(values: FloatArray, rows: int, derivative: int, period_s: fl
         at = np.arange(inner.start - window.start, inner.stop - window.start, dtype=np.float64)
         found[inner] = np.polyval(fit, at) / period_s**derivative
     return found
+
+
+def first_step(values: FloatArray, noise: float) -> float:
+    """Step by which values (n,) reach the first of them, by a parabola from there through as many as it fits.
+
+    An axis that starts to move within the rows is on no parabola with them.
+    """
+    rows = values
+    while np.ptp(rows) > 0.0:  # at rest the polynomial would give rounding errors
+        at = np.arange(rows.size)
+        curve, slope, first = np.polyfit(at, rows, 2)
+        left = rows - (curve * at**2 + slope * at + first)
+        if rows.size <= _FEWEST or float(np.sqrt(np.mean(left**2))) <= _FITS * noise:
+            return float(slope - curve)
+        rows = rows[:-1]
+    return 0.0

@@ -129,3 +129,18 @@ def test_rest_is_seen_beside_the_noise_of_the_encoder() -> None:
     assert np.mean(seen[still]) > 0.9
     fast = np.abs(np.gradient(quiet.motor)) > 0.05 * quiet.period_s
     assert not seen[fast].any()
+
+
+def test_a_part_that_begins_as_the_axis_starts_begins_at_rest() -> None:
+    """A parabola through all its first rows would give it a speed, and the law a torque that it has not."""
+    owner = bench()
+    run = recorded(owner)
+    moved = np.flatnonzero(np.diff(run["motor_position_rad"]))
+    begins = np.flatnonzero(np.diff(moved) > 50)  # rests of 50 ms and longer
+    first = int(moved[begins[0] + 1]) - 6
+    part = replace(
+        run,
+        columns={name: values[first:] for name, values in run.columns.items()},
+        start_s=run.start_s + first * run.period_s,
+    )
+    assert take(part, owner).start.velocity_m_s == pytest.approx(0.0, abs=1e-4)

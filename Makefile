@@ -33,7 +33,8 @@ $(INSTALLED): requirements.lock pyproject.toml
 test: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/hil warm-up & compiling=$$!; $(BIN)/mypy && wait $$compiling
+	$(BIN)/hil warm-up & compiling=$$!; trap "kill $$compiling" INT TERM; \
+	if $(BIN)/mypy; then wait $$compiling; else kill $$compiling; exit 1; fi
 	$(BIN)/lint-imports
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist loadfile -m "not long and not net"
 

@@ -22,7 +22,10 @@ BINS = 10  # of a quantity: a bend, a step and a line show in them; twice as man
 _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation by an eighth
 _DECAYED = 0.05  # of the variance: the correlation time ends there
 _NARROWEST = 0.2  # bin, over one of equal width
-_CHATTER = 3  # crossings of an edge by a quantity that comes near it: it may turn there; more are its noise
+_NOISE = 4.0  # times the usual change from row to row: near an edge
+_DENSE = (
+    3.0  # times the rows near an edge, over equally spread ones: a plateau; where a sine turns there are twice as many
+)
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 
@@ -77,7 +80,7 @@ def _structure(parts: Sequence[ResidualSeries], quantity: Sequence[FloatArray], 
     values = np.concatenate([one[part.rows] for one, part in zip(quantity, parts, strict=True)])
     if values.size < bins or not np.isfinite(values).all():
         return None
-    edges = _edges([one[part.rows] for one, part in zip(quantity, parts, strict=True)], values, bins)
+    edges = _edges([one[part.rows] for one, part in zip(quantity, parts, strict=True)], bins)
     count = edges.size - 1
     if count < 2:
         return None
@@ -139,27 +142,33 @@ def autocovariance(parts: Sequence[ResidualSeries]) -> FloatArray:
     return np.asarray(covariance[:length] * (1.0 - np.arange(length) / length))
 
 
-def _edges(quantity: Sequence[FloatArray], values: FloatArray, bins: int) -> FloatArray:
-    """Edges (K + 1,) of at most so many bins of a quantity, (n,) for each part, all of whose `values` are given."""
+def _edges(quantity: Sequence[FloatArray], bins: int) -> FloatArray:
+    """Edges (K + 1,) of at most so many bins of a quantity, (n,) for each part.
+
+    An edge within a plateau goes into the gap to the edge beside it, if there is one.
+    """
+    values = np.sort(np.concatenate(quantity))
     wanted = np.quantile(values, np.linspace(0.0, 1.0, bins + 1))
-    least = _NARROWEST * (wanted[-1] - wanted[0]) / bins
-    kept = [wanted[0]]
-    for edge in wanted[1:-1]:
-        if edge - kept[-1] > least and wanted[-1] - edge > least and _passes(quantity, edge, least):
-            kept.append(edge)
+    range_ = float(wanted[-1] - wanted[0])
+    least = _NARROWEST * range_ / bins
+    changes = np.concatenate([np.abs(np.diff(one)) for one in quantity])
+    near = max(least, _NOISE * float(np.median(changes))) if changes.size else least
+
+    def below(edge: float) -> int:
+        return int(np.searchsorted(values, edge))
+
+    def stands(edge: float, last: float) -> bool:
+        """True outside of plateaus, where the bin from the last edge on, and the rest, have width and rows."""
+        wide = edge - last > least and wanted[-1] - edge > least
+        filled = min(below(edge) - below(last), values.size - below(edge)) > 0.5 * values.size / bins
+        dense = (below(edge + near) - below(edge - near)) * range_ > _DENSE * 2.0 * near * values.size
+        return wide and filled and not dense
+
+    kept = [float(wanted[0])]
+    for before, edge, after in zip(wanted, wanted[1:], wanted[2:], strict=False):
+        gaps = [0.5 * (edge + other) for other in (before, after) if abs(other - edge) > 2.0 * near]
+        kept += [one for one in (edge, *gaps) if stands(one, kept[-1])][:1]
     return np.array([*kept, wanted[-1]])
-
-
-def _passes(quantity: Sequence[FloatArray], edge: float, near: float) -> bool:
-    """True if a quantity that comes `near` an edge passes it, and does not go to and fro over it."""
-    crossed = visits = 0
-    for one in quantity:
-        beyond, close = one >= edge, np.abs(one - edge) < near
-        changes = np.diff(beyond)
-        crossed += int(np.count_nonzero(changes))
-        visits += int(np.count_nonzero(close[:1]) + np.count_nonzero(close[1:] & ~close[:-1]))
-        visits += int(np.count_nonzero(changes & ~close[1:] & ~close[:-1]))
-    return crossed <= _CHATTER * visits
 
 
 def _bin(quantity: FloatArray, edges: FloatArray) -> NDArray[np.intp]:

@@ -109,5 +109,5 @@ def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
         return True
     if told.of:
         named = unit_named(table.units.get(name, "")) or label(table.titles.get(name, name)).unit
-        return named in (None, told.of)
+        return named == told.of
     return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

@@ -19,9 +19,7 @@ _NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)
 _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)|:\s")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
 _EQUAL = re.compile(r"(\d+(?:,\d{3})*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)")
-_PER_VOLT = re.compile(
-    r"(?<![\d.,])(?P<size>\d+(?:[.,]\d+)?)\s*(?P<unit>[^\W\d][^\d/,;=]*?)\s*(?:/|\bper\b)\s*(?P<own>m?V)\b"
-)
+_PER_VOLT = re.compile(r"([+-]?\d+(?:\.\d+|,\d{1,2}(?!\d))?(?:e[+-]?\d+)?)\s*([^\W\d][^\d/]*?)\s*(?:/|\bper\b)\s*(m?V)")
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
 _PER_TURN = re.compile(  # 65536 counts per motor turn
@@ -31,7 +29,7 @@ _PER_TURN = re.compile(  # 65536 counts per motor turn
 )
 _CELLS = re.compile(r"\s*\|(.+)\|\s*")  # a row of a table
 _NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
-_SENTENCE = re.compile(r"[.]\s+(?=[^\W\d_a-z])")  # a capital follows
+_SENTENCE = re.compile(r"[.]\s+(?=[A-ZÄÖÜÉÈ])")
 _FEWEST = 3  # columns that a sentence lists: fewer are words
 
 
@@ -48,15 +46,16 @@ class ToldColumn(NamedTuple):
     of: str = ""
 
 
-def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldColumn]:
+def told_columns(lines: Sequence[str], names: Sequence[str], prose: bool = False) -> dict[str, ToldColumn]:
     """What `lines` say of the columns `names`: a list of them; sentences, if the list gives fewer than two units.
 
-    A line that begins with a name goes before one in which it stands, a unit before the size of a count.
+    A line that begins with a name goes before one in which it stands, a unit before the size of a count. `prose`: a
+    name that is a word may begin a sentence of its own.
     """
     lines = [_plain_line(line) for line in lines]
     told, ranks = dict[str, ToldColumn](), dict[str, tuple[bool, bool]]()
     mentions = [[(name, True, text)] for name, text in _numbered(lines, names)]
-    mentions += [_mentions(line, [one for one in names if one]) for line in lines]
+    mentions += [_mentions(line, [one for one in names if one], prose) for line in lines]
     for line in mentions:
         of_both: ToldColumn | None = None  # what the next name in the line says of this one, too
         for name, begins, text in reversed(line):
@@ -66,7 +65,9 @@ def told_columns(lines: Sequence[str], names: Sequence[str]) -> dict[str, ToldCo
             rank = begins, one.step is None
             if one.unit and (name not in told or rank > ranks[name]):
                 told[name], ranks[name] = one, rank
-    return told if len(told) > 1 else _in_a_row(" ".join(lines), names)
+    if len(told) > 1:
+        return told
+    return {} if prose else _in_a_row(" ".join(lines), names) or told_columns(lines, names, prose=True)
 
 
 def _plain_line(line: str) -> str:
@@ -91,7 +92,7 @@ def _numbered(lines: Sequence[str], names: Sequence[str]) -> list[tuple[str, str
     return next(one for one, many in zip(reversed(lists), reversed(units), strict=True) if many == max(units))
 
 
-def _mentions(line: str, names: Sequence[str]) -> list[tuple[str, bool, str]]:
+def _mentions(line: str, names: Sequence[str], prose: bool) -> list[tuple[str, bool, str]]:
     """Names of columns in a line, whether it begins with them, and the text behind each up to the next."""
     places: list[tuple[int, int, str, bool]] = []
     for name in names:
@@ -100,16 +101,22 @@ def _mentions(line: str, names: Sequence[str]) -> list[tuple[str, bool, str]]:
         within = None
         if not match and re.search(r"[\d_]", name) and len(name) > 1:
             within = re.search(rf"(?<![\w.-]){own}(?![\w-])", line)
-        elif not match:
+        elif not match and prose:
             within = re.search(rf"(?:^|[.]\s+){own} (?=in )", line)  # a sentence of it: I act in digits
         places += [(one.start(), one.end(), name, one is match) for one in (match or within,) if one]
     places.sort()
     ends = [*(place[0] for place in places), len(line)][1:]
     texts = [line[begin:end] for (_, begin, _, _), end in zip(places, ends, strict=False)]
     return [
-        (name, begins, (text if begins else _SENTENCE.split(text)[0]).strip(" :=-–,;.\t"))
+        (name, begins, _until_a_unit(text).strip(" :=-–,;.\t"))
         for (_, _, name, begins), text in zip(places, texts, strict=True)
     ]
+
+
+def _until_a_unit(text: str) -> str:
+    """The first sentences of a text, up to the one that gives a unit; what follows may be of something else."""
+    ends = [match.start() for match in _SENTENCE.finditer(text)]
+    return next((text[:end] for end in ends if _told(text[:end]).unit), text)
 
 
 def _phrases(text: str) -> list[str]:
@@ -126,11 +133,10 @@ def _of_both(text: str) -> ToldColumn | None:
 def _told(text: str) -> ToldColumn:
     """Words, unit and step of what is said of a column. A plain unit goes before the size of a count."""
     phrases = _phrases(text)
-    if volt := _PER_VOLT.search(text):
-        unit = unit_named(volt["unit"])
-        if unit and QUANTITY_OF_UNIT.get(unit) is Quantity.EFFORT:
-            return ToldColumn(phrases[0], unit, float(volt["size"].replace(",", ".")), of=volt["own"])
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
+    volts = next(filter(None, map(_per_volt, phrases)), None) if unit_named(unit) in (None, "V", "mV") else None
+    if volts:
+        return volts._replace(words="" if _per_volt(phrases[0]) else phrases[0])
     equal = next(filter(None, map(_equal, phrases)), None)
     if equal and (not unit or unit_named(unit) in ("counts", "%", "permille")):
         return ToldColumn("" if _equal(phrases[0]) else phrases[0], equal[1], equal[0])
@@ -145,11 +151,20 @@ def _told(text: str) -> ToldColumn:
     return next((ToldColumn(words, of_step, size) for size, of_step in steps), ToldColumn(words, unit))
 
 
+def _per_volt(phrase: str) -> ToldColumn | None:
+    """A torque or force for each volt of the column, where a phrase is nothing else: 2 Nm/V; None for others."""
+    match = _PER_VOLT.fullmatch(phrase)
+    unit = unit_named(match[2]) if match else None
+    if not match or unit is None or QUANTITY_OF_UNIT.get(unit) is not Quantity.EFFORT:
+        return None
+    return ToldColumn("", unit, float(match[1].replace(",", ".")), of=match[3])
+
+
 def _equal(phrase: str) -> tuple[float, str] | None:
     """Size and unit of a count, told by an equation: 1000 = 3.2 Nm, 16384 digits = 16 A; None without one."""
     match = _EQUAL.fullmatch(phrase)
     whole, own, size, unit = match.groups() if match else ("", "", "", "")
-    if not (match and _is_unit(unit) and unit_named(own) in (None, "counts")):
+    if not (match and _is_unit(unit) and (own in ("", "digit", "digits") or unit_named(own) == "counts")):
         return None
     many, value = float(whole.replace(",", "")), float(size.replace(",", "."))
     return (value / many, unit) if many and value else None

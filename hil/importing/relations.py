@@ -28,19 +28,20 @@ class Relation:
     share: float
 
 
-def proportional(values: FloatArray, other: FloatArray) -> Relation:
-    """Fit values = k other + c, both (n,)."""
-    x, y = other - other.mean(), values - values.mean()
+def proportional(values: FloatArray, other: FloatArray, *, through_zero: bool = False) -> Relation:
+    """Fit values = k other + c, both (n,); `through_zero`: without c, and with no share where k is negative."""
+    x, y = (other, values) if through_zero else (other - other.mean(), values - values.mean())
     power, total = float(x @ x), float(y @ y)
     if power == 0.0 or total == 0.0:
         return Relation(0.0, 0.0)
     factor = float(x @ y) / power
-    return Relation(factor, float(x @ y) ** 2 / (power * total))
+    against = through_zero and factor < 0.0
+    return Relation(factor, 0.0 if against else float(x @ y) ** 2 / (power * total))
 
 
-def derivative_of(values: FloatArray, moved: MeasuredMotion, period_s: float) -> Relation:
-    """Fit a column (n,) as a multiple of the velocity of a motion."""
-    return proportional(smoothed(values, period_s), moved.velocity)
+def derivative_of(values: FloatArray, moved: MeasuredMotion, period_s: float, through_zero: bool = False) -> Relation:
+    """Fit a column (n,) as a multiple of the velocity of a motion; `through_zero`: at a constant speed."""
+    return proportional(smoothed(values, period_s), moved.velocity, through_zero=through_zero)
 
 
 def explained(values: FloatArray, *columns: FloatArray) -> float:

@@ -21,7 +21,7 @@ from hil.importing.unnamed_columns import quantities_by_relations
 from hil.quantities import UNITS
 from hil.recording.quantum import count_of
 
-_EVEN = 0.1  # deviation of a constant speed over its mean, at most
+_EVEN = 0.1  # deviation of a constant speed over its mean, at most: the noise of both is all that differs
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
 _ALONE = "a set-point of the velocity; the control law is read from set-points of the position"
 _NO_ROLE = {
@@ -267,9 +267,8 @@ def _velocities(
     roles.left_out |= dict.fromkeys(commands[1:], "another set-point of the velocity")
     for name in measured:
         roles.left_out[name] = "velocity of the motion, follows from the position"
-        if np.std(moved.velocity) < _EVEN * abs(float(np.mean(moved.velocity))):
-            continue  # at constant speed the noise of both is all that differs
-        share = derivative_of(live[name], moved, period_s).share
+        even = np.std(moved.velocity) < _EVEN * abs(float(np.mean(moved.velocity)))
+        share = derivative_of(live[name], moved, period_s, through_zero=bool(even)).share
         if share < 0.5:
             inverse = derivative_of(live[roles.motor], motion(live[name], period_s), period_s).share
             if inverse > IS_DERIVATIVE:

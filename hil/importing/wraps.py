@@ -1,5 +1,7 @@
 """Unwrap counters and angles that start again at the end of their range."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hil.arrays import FloatArray
@@ -9,7 +11,7 @@ _SUDDEN = 5.0  # times the change of the rows around: a motion changes its speed
 _STRAIGHT = 0.5  # of the path around a wrap in one direction: noise goes to and fro
 _AROUND = 5  # rows before and after, which must run against the jump
 _STAYS = 3  # rows after a wrap without another jump: a spike comes back at once
-_GRADUAL = 0.1  # of the range: most change of the way from row to row, of a motion that wraps within few rows
+_SEVERAL, _ALIKE = 3, 0.8  # jumps by one usual range, and their share: a fast motion, beside which they are not sudden
 _FEW_VALUES = 20  # of a switched signal, whose steps are no wraps
 _SAME = 0.1  # of the range: by how much the ranges of several wraps may differ
 _CLOSE = 0.01  # relative deviation from a usual range
@@ -30,17 +32,42 @@ _USUAL = (
 def wrap_range(values: FloatArray) -> float | None:
     """Range at which a column (n,) wraps, such as 65536 or 360; None if it does not.
 
-    A wrap is a jump over the whole range against the motion before and after it. Where the motion goes a large part of
-    a usual range in a row, unwrapping by that range makes it even.
+    A wrap is a jump over the whole range against the motion before and after it. It is sudden; beside a motion that
+    goes a large part of its range in a row, several are by one usual range.
     """
     finite = values[np.isfinite(values)]
     spread = float(np.ptp(finite)) if finite.size else 0.0
     if finite.size < 2 * _AROUND + 2 or spread == 0.0 or np.unique(finite).size < _FEW_VALUES:
         return None
     change = np.diff(finite)
-    jumps = np.flatnonzero(np.abs(change) > WHOLE_RANGE * spread)
-    ranges, backwards = [], 0
-    for row in jumps:
+    found = _jumps(change, spread, WHOLE_RANGE)
+    if found.sudden > 0.5 * found.all:
+        size = float(np.median(found.ranges))
+        if np.ptp(found.ranges) > 2.0 * _SAME * size:
+            return None
+        return _usual(size) or float(f"{size:.4g}")
+    fast = _jumps(change, spread, 0.5)
+    if len(fast.ranges) < _SEVERAL or fast.backwards <= 0.5 * fast.all:
+        return None
+    size = float(np.median(fast.ranges))
+    alike = float(np.mean(np.abs(np.array(fast.ranges) - size) < _CLOSE * size))
+    return _usual(size) if alike >= _ALIKE else None
+
+
+class _Jumps(NamedTuple):
+    """Number of all jumps, of those against the motion around them and of the sudden ones of these; their ranges."""
+
+    all: int
+    backwards: int
+    sudden: int
+    ranges: list[float]
+
+
+def _jumps(change: FloatArray, spread: float, least: float) -> _Jumps:
+    """The jumps among changes (m,) from row to row that are larger than a share of the spread of the values."""
+    rows = np.flatnonzero(np.abs(change) > least * spread)
+    ranges, backwards, sudden = list[float](), 0, 0
+    for row in rows:
         around = np.r_[change[max(row - _AROUND, 0) : row], change[row + 1 : row + 1 + _AROUND]]
         around = around[np.abs(around) < 0.5 * spread]
         if around.size < _AROUND or np.any(np.abs(change[row + 1 : row + 1 + _STAYS]) > 0.5 * spread):
@@ -48,25 +75,17 @@ def wrap_range(values: FloatArray) -> float | None:
         speed = float(np.median(around))
         if np.abs(around.sum()) < _STRAIGHT * np.abs(around).sum():
             continue
-        backwards += speed * change[row] < 0.0 and abs(change[row]) > _SUDDEN * np.max(np.abs(around))
+        against = speed * change[row] < 0.0
+        backwards += against
+        sudden += against and bool(abs(change[row]) > _SUDDEN * np.max(np.abs(around)))
         ranges.append(abs(float(change[row]) - speed))
-    if not ranges or backwards <= 0.5 * len(jumps):
-        return _of_fast_motion(finite, spread)
-    size = float(np.median(ranges))
-    if np.ptp(ranges) > 2.0 * _SAME * size:
-        return None
+    return _Jumps(rows.size, backwards, sudden, ranges)
+
+
+def _usual(size: float) -> float | None:
+    """The usual range that a size is within its errors; None if it is none."""
     usual = min(_USUAL, key=lambda one: abs(size / one - 1.0))
-    return float(usual) if abs(size / usual - 1.0) < _CLOSE else float(f"{size:.4g}")
-
-
-def _of_fast_motion(values: FloatArray, spread: float) -> float | None:
-    """The usual range, little more than the spread, by which unwrapped values (n,) move evenly; None without one."""
-    for size in _USUAL:
-        if spread <= size <= spread / WHOLE_RANGE and np.max(np.abs(np.diff(values))) > 0.5 * size:
-            way = np.diff(np.unwrap(values, period=size))
-            if np.max(np.abs(np.diff(way))) < _GRADUAL * size:
-                return size
-    return None
+    return float(usual) if abs(size / usual - 1.0) < _CLOSE else None
 
 
 def unwrapped(values: FloatArray, size: float) -> FloatArray:

@@ -6,6 +6,7 @@ a term is extrapolated, by a time constant that a part of a warm-up hardly tells
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from hil.diagnosis.search.refits import carried, over
 from hil.diagnosis.stages import Prepared, Searched, Tested
@@ -20,61 +21,78 @@ from hil.identification.torque_left import fit_plain
 from hil.twin.library import BY_ID
 
 
+class _Parts(NamedTuple):
+    """Recordings for training without their middle, and the middle of each."""
+
+    train: list[Measured]
+    middle: list[Measured]
+
+
 def test_inside_time(searched: Searched) -> Tested:
-    """Test the terms on held-out recordings; where an end refutes one that goes on with time, on the middle."""
+    """Test the terms on held-out recordings; where an end refutes one that goes on with time, on the middle.
+
+    The second test counts if it names that term.
+    """
     tested = test_on_held_out(searched)
-    refuted = [one.term for one in tested.proof.dropped if _goes_on(one.term)]
-    inside = with_middle_held_out(searched, refuted[0]) if refuted else None
-    again = test_on_held_out(inside) if inside else tested
-    return again if any(_goes_on(term) for term in again.proof.final.terms) else tested
+    refuted = [one.term for one in tested.proof.dropped if one.refuted and _goes_on(one.term)]
+    for term in refuted[:1]:
+        inside = with_middle_held_out(searched, term)
+        again = test_on_held_out(inside) if inside else tested
+        if term.effect in {one.effect for one in again.proof.final.terms}:
+            return again
+    return tested
 
 
 def with_middle_held_out(searched: Searched, term: Term) -> Searched | None:
-    """The fits of a search with the middle of each recording held out; None unless ends of the same are.
+    """The fits of a search with the middle of each recording held out; None unless `split` held out their ends.
 
     `term` is the reason, for the note.
     """
     prepared, final = searched.prepared, searched.final
-    parts = _parts(prepared.train.runs, prepared.held_out.runs)
-    if not parts:
+    by_split = any(note.startswith(HELD_OUT_NOTE) for note in prepared.notes)
+    parts = _parts(prepared.train.runs, prepared.held_out.runs) if by_split else None
+    if parts is None:
         return None
-    data, own = prepared.train.over(parts[0]), final.data.over(parts[0])
+    data, own = prepared.train.over(parts.train), final.data.over(parts.train)
     if final.data is prepared.train:
         own = data
     elif final.data.apart:
         own = _apart(own, searched)
     note = (
         f"{HELD_OUT_NOTE} the middle of each recording is used for validation, since {title(term.effect)} goes on "
-        "with time: its end lies outside the time of the rest."
+        "with time; the end, outside the time of the rest, is predicted worse with it."
     )
     notes = (*(one for one in prepared.notes if not one.startswith(HELD_OUT_NOTE)), note)
-    inside: Prepared = replace(prepared, train=data, held_out=data.over(parts[1]), notes=notes)
+    inside: Prepared = replace(prepared, train=data, held_out=data.over(parts.middle), notes=notes)
     given, nominal = carried(data, searched.given), over(data, searched.nominal)
     return replace(searched, prepared=inside, given=given, nominal=nominal, final=over(own, final))
 
 
 def _goes_on(term: Term) -> bool:
+    """True of a term that a report may tell as a rate: its law goes on beyond the recording."""
     return bool(BY_ID[term.effect].text.rate)
 
 
-def _parts(train: Sequence[Measured], held_out: Sequence[Measured]) -> tuple[list[Measured], list[Measured]] | None:
-    """Training recordings without their half beside the end that was held out, with that end; and these halves."""
+def _parts(train: Sequence[Measured], held_out: Sequence[Measured]) -> _Parts | None:
+    """Cut the training part of each recording; its half beside the end that was held out is the middle."""
     ends = {whole_name(run.name): run for run in held_out}
-    outer, middle = list[Measured](), list[Measured]()
+    if len(ends) < len(held_out):  # recordings of one name
+        return None
+    parts = _Parts([], [])
     for run in train:
         end = ends.pop(whole_name(run.name), None)
         if end is None:
-            outer.append(run)
+            parts.train.append(run)
             continue
         ordered = in_turn([run, end])
         if not ordered:
             return None
         row = (run.evaluated.start + run.motor.size) // 2
-        halves = run.until(row), replace(run, lead_in=row)
-        first = ordered[0] is run
-        outer += [halves[0], end] if first else [end, halves[1]]
-        middle.append(replace(halves[1 if first else 0], name=f"{whole_name(run.name)} ({MIDDLE_PART})"))
-    return None if ends or not middle else (outer, middle)
+        first, last = replace(run.until(row), lead_in=run.evaluated.start), replace(run, lead_in=row)
+        outer, inner = ([first, end], last) if ordered[0] is run else ([end, last], first)
+        parts.train.extend(outer)
+        parts.middle.append(replace(inner, name=f"{whole_name(run.name)} ({MIDDLE_PART})"))
+    return None if ends or not parts.middle else parts
 
 
 def _apart(data: Dataset, searched: Searched) -> Dataset:

@@ -163,6 +163,7 @@ def test_the_step_of_a_quantised_channel_is_found_and_none_in_a_smooth_one() -> 
     steady = 9.0 * np.arange(600) + np.random.default_rng(6).normal(0.0, 0.02, 600)  # of which each row is one step
     assert count_of(np.round(steady / 0.01) * 0.01) == pytest.approx(0.01, rel=1e-3)
     assert count_of(steady) is None
+    assert count_of(np.arange(600) * np.float32(1e-3)) == pytest.approx(1e-3, rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -178,3 +178,27 @@ def test_a_sentence_lists_columns_with_units_in_brackets() -> None:
     lines = ["Columns: stamp_ns (unix ns, wobbling), position (rad, joint side, 4096 counts / motor rev), current (A)."]
     told = told_columns(lines, ["stamp_ns", "position", "current"])
     assert {name: one.unit for name, one in told.items()} == {"stamp_ns": "ns", "position": "rad", "current": "A"}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "- torque: measured torque in Nm (transducer 2 Nm/V)",
+        "- torque: measured torque [Nm]. The brake needs 8 Nm/V.",
+        "- torque: measured, 1 pitch = 5 mm, in Nm",
+    ],
+)
+def test_a_plain_unit_goes_before_ratios_of_something_else(line: str) -> None:
+    told = told_columns(["- pos: rad", line], ["pos", "torque"])["torque"]
+    assert (told.unit, told.step) == ("Nm", None)
+
+
+@pytest.mark.parametrize(
+    ("line", "units"),
+    [
+        ("a_1 akt. Lage in mm, b_2 Drehm. Ist in Nm", {"a_1": "mm", "b_2": "Nm"}),
+        ("Lage in mm. Moment in Nm. Spalten: t = Zeit in s, Lage = Winkel in deg", {"t": "s", "Lage": "deg"}),
+    ],
+)
+def test_sentences_do_not_hide_lists(line: str, units: dict[str, str]) -> None:
+    assert {name: one.unit for name, one in told_columns([line], list(units)).items()} == units

@@ -166,6 +166,8 @@ def test_a_wrap_is_found_with_its_range(values: np.ndarray, size: float | None) 
         np.where(T > 2.0, ANGLE + 500.0, ANGLE),  # a jump
         RANDOM.normal(size=T.size),
         RANDOM.uniform(0.0, 360.0, T.size),
+        np.mod(np.cumsum(np.full(600, 0.2 * 32768.0)), 32768.0) * 1.02,  # fast, by no usual range
+        460.0 * np.sign(np.sin(7.0 * T)) + RANDOM.normal(size=T.size),
         ANGLE,
     ],
 )

@@ -23,9 +23,8 @@ _TAPER = 4  # Bartlett window in correlation times: it shortens the correlation 
 _DECAYED = 0.05  # of the variance: the correlation time ends there
 _NARROWEST = 0.2  # bin, over one of equal width
 _NOISE = 4.0  # times the usual change from row to row: near an edge
-_DENSE = (
-    3.0  # times the rows near an edge, over equally spread ones: a plateau; where a sine turns there are twice as many
-)
+# Times the rows near an edge over equally spread ones: a plateau; where a sine turns there are twice as many.
+_DENSE = 3.0
 _FEWEST_INDEPENDENT = 2.0  # independent rows per bin, below which nothing is told
 
 

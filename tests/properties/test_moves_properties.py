@@ -59,6 +59,7 @@ def check_move(start_m: float, stroke_m: float, limits: MotionLimits) -> None:
     assert max(u / a for u, a in zip(used, allowed, strict=True)) == pytest.approx(1, abs=1e-9)
 
 
+@pytest.mark.long
 def test_ten_thousand_random_moves_hold_limits_and_end_where_they_should() -> None:
     rng = np.random.default_rng(20)
     for _ in range(10_000):

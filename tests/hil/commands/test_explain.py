@@ -62,6 +62,7 @@ def test_the_first_answer_comes_before_the_search(explained: tuple[Path, str, st
     assert out.index("Plain model: inertia") < out.index("coulomb_torque_n_m") < out.index("noise floor")
 
 
+@pytest.mark.long
 def test_a_corrected_bench_is_taken_up_again(explained: tuple[Path, str, str]) -> None:
     folder, _, _ = explained
     bench = folder / FOLDER / "bench.yaml"

@@ -88,6 +88,7 @@ def test_a_compensation_that_the_bench_has_is_said_to_be_off(tmp_path: Path) -> 
     assert again.pairs(Adds.POSITION)[0][0] == pytest.approx(trial.pairs(Adds.POSITION)[0][0], rel=0.02)
 
 
+@pytest.mark.long
 def test_a_run_that_stops_ends_the_trial(tmp_path: Path) -> None:
     data = bench_of_effects().model_dump(mode="json")
     data["drive"]["following_error_m"] = 1e-6
@@ -99,6 +100,7 @@ def never(bench: Bench, profile: Profile, place: Path, name: str) -> RunResult:
     raise AssertionError(name)
 
 
+@pytest.mark.long
 def test_what_the_drive_or_the_encoders_do_not_allow_costs_no_run(tmp_path: Path) -> None:
     data = bench_of_effects().model_dump(mode="json")
     data["drive"]["mode"], data["encoders"]["table"] = "csp", None

@@ -51,6 +51,7 @@ def test_gains_are_drafted_with_and_without_a_speed_set_point(scale: float | Non
     assert_drafted(loop_values(recording, RATIO_M_RAD))
 
 
+@pytest.mark.long
 def test_a_delay_of_the_set_points_is_drafted() -> None:
     drafted = loop_values(servo_run(OWNER, late_rows=7), RATIO_M_RAD)
     assert_drafted(drafted, setpoint_delay_s=7e-3)
@@ -62,6 +63,7 @@ def test_a_feed_forward_of_the_last_difference_of_the_set_points_is_drafted() ->
     assert_drafted(drafted, velocity_setpoint="backward_difference")
 
 
+@pytest.mark.long
 def test_a_filter_of_the_velocity_is_drafted() -> None:
     """A drive whose loops run at one rate, with a filter of four periods."""
     control = OWNER.known_control.model_copy(

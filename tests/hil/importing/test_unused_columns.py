@@ -41,6 +41,7 @@ MOTION = {"position": {"angle": "motor_angle_rad"}, "velocity": {"speed": "motor
 
 @settings(deadline=None, max_examples=20)
 @given(motion=st.sampled_from(sorted(MOTION)), names=st.lists(st.sampled_from(sorted(MORE)), unique=True, max_size=6))
+@pytest.mark.long
 def test_each_column_is_used_or_listed_once(
     tmp_path_factory: pytest.TempPathFactory, motion: str, names: list[str]
 ) -> None:

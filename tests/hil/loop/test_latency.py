@@ -169,6 +169,7 @@ def test_twice_the_missed_periods_of_cyclictest_are_the_machine(loop: int, other
     assert beside(*(Latencies({1e-6: 100, 0.001 * count + 1e-5: 1}) for count in (loop, other)), 0.001) == words
 
 
+@pytest.mark.long
 def test_why_cyclictest_gave_nothing_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cyclictest(tmp_path, monkeypatch, "echo Unable to change scheduling policy! >&2; exit 1")
     assert measure(0.002, 0.02).why_not == "cyclictest failed: Unable to change scheduling policy!"
@@ -202,6 +203,7 @@ def test_the_command_prints_a_histogram_of_80_columns(tmp_path: Path) -> None:
         assert any(line.startswith(f"{rate_hz:5g} Hz  ") for line in lines)
 
 
+@pytest.mark.long
 def test_json_has_every_count(tmp_path: Path) -> None:
     ran = hil(tmp_path, "latency", "--seconds", "0.1", "--json", "--load")
     data = json.loads(ran.stdout)

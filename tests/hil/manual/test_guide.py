@@ -16,7 +16,7 @@ from guide_pages import NEEDS_HARDWARE, ROOT, Step, prepared, run, steps
 from hil.manual.topics import FOLDER, GUIDE, TOPICS, for_terminal, guide_page, title
 
 SLOW = re.compile(
-    r"hil (demo|explain|diagnose|investigate|compare|identify|fleet)\b|--seconds|hil\.diagnose"
+    r"hil (demo|run|explain|diagnose|investigate|compare|identify|fleet)\b|--seconds|hil\.diagnose"
     r"|compensate|profiles/(positioning|circle|frequency_response)"
 )
 
@@ -27,7 +27,7 @@ def at_the_desk(topic: str) -> list[Step]:
 
 
 def is_slow(step: Step) -> bool:
-    return bool(SLOW.search(step.text)) or "register" in step.text
+    return bool(SLOW.search(step.text)) or "register" in step.text or step.name.endswith(".py")
 
 
 @pytest.mark.parametrize("topic", GUIDE)

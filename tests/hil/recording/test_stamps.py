@@ -190,6 +190,7 @@ def test_steps_without_digits_are_refused() -> None:
         made(TICKS_S * 1e-300, position(TICKS_S))
 
 
+@pytest.mark.long
 def test_rows_that_would_fill_the_memory_are_refused() -> None:
     uneven_s = TICKS_S + RANDOM.uniform(-2e-4, 2e-4, ROWS)
     with pytest.raises(InputError, match=r"rows of 2 channels at 1e\+09 Hz, allowed 50000000 values together"):

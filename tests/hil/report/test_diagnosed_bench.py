@@ -93,6 +93,7 @@ def test_its_twin_leaves_what_the_diagnosis_reports(found: Diagnosis, tmp_path: 
     assert torque.rms == pytest.approx(entry.validate_.after_rms, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_second_diagnosis_with_it_finds_nothing(found: Diagnosis, tmp_path: Path) -> None:
     _, again = written(found, tmp_path)
     second = diagnose([TRAIN], [HELD_OUT], again)

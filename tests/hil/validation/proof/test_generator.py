@@ -184,6 +184,7 @@ def test_every_effect_can_be_drawn_and_run_on_each_axis(kind: Kind) -> None:
     assert seen == {*names, *novel(axis)}
 
 
+@pytest.mark.long
 def test_sizes_are_monotone_in_the_strength_and_hit_the_rungs() -> None:
     rng = np.random.default_rng(5)
     on = stage(rng, "two_mass")

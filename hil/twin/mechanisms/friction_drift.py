@@ -24,7 +24,7 @@ MECHANISM = Mechanism(
     equation="F(t) = F (1 + a (1 - exp(-t/tau))); viscous: of the viscous friction alone",
     source="Bittencourt and Gunnarsson, ASME J. Dynamic Systems, Measurement, and Control 134 (2012) 051013",
     parameters=(
-        Parameter("fraction", Dimension.RATIO, -1.0, 5.0, role=Role.STRENGTH),
+        Parameter("fraction", Dimension.RATIO, -0.95, 5.0, role=Role.STRENGTH),
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(

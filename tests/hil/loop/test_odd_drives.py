@@ -278,6 +278,7 @@ def test_a_drive_that_is_set_up_again_does_not_miss_its_master_meanwhile(odd: Od
     assert run_profile(odd.rig.bench, BACK, odd.folder, "again", virtual=True, rig=odd.rig).complete
 
 
+@pytest.mark.long  # a PC that stalls for 20 ms stops the axis, as it should
 def test_hil_run_by_the_wall_clock(tmp_path: Path) -> None:
     """The command against a drive that boots, answers and switches in its own time, in another thread."""
     odd = Odd(tmp_path)

@@ -184,7 +184,7 @@ def take(recording: Recording, bench: Bench) -> Measured:
     known = observability(recording, bench)
     if not known.position_measured:
         noise = replace(noise, motor=recording.period_s * white_noise(_column(recording, names.motor_velocity)))
-    least = noise.motor if bench.law_known else np.inf  # a law hangs on the first speed: its integrator makes up for it
+    least = noise.motor if bench.law_known else np.inf  # the integrator of a law is set from the first speed
     start = _start(gains, (position, velocity, motor, feedback), own, least)
     return Measured(
         name=recording.name,

@@ -19,7 +19,7 @@ from hil.importing.row_counters import COUNTER, rises_evenly
 from hil.importing.two_encoders import follows_steps, motors_encoder, named_encoders
 from hil.importing.unnamed_columns import quantities_by_relations
 from hil.quantities import UNITS
-from hil.recording.quantum import count_of
+from hil.recording.quantum import SINGLE, count_of
 
 _EVEN = 0.1  # deviation of a constant speed over its mean, at most: the noise of both is all that differs
 FOLLOWED = 0.5  # share of a set-point that a controlled motion follows: less is another axis or no loop
@@ -31,7 +31,6 @@ _NO_ROLE = {
     Quantity.UNKNOWN: "its name says nothing, and no relation to the motion is found",
 }
 SAME_COLUMN = 1e-6  # of the travel: a copy in another unit deviates by printed digits, a second sensor by more
-_SINGLE = 2.5e-7  # of a number: rounding in single precision, both ways
 
 
 @dataclass
@@ -240,7 +239,7 @@ def _copies(first: FloatArray, second: FloatArray) -> bool:
     """True if two columns (n,) are the same numbers in two units, but for their rounding: a second sensor has noise."""
     factor = proportional(second, first).factor
     steps = abs(factor) * (count_of(first) or 0.0) + (count_of(second) or 0.0)
-    rounding = max(2.0 * steps, _SINGLE * float(np.max(np.abs(second))))
+    rounding = max(2.0 * steps, SINGLE * float(np.max(np.abs(second))))
     left = second - factor * first
     return bool(factor != 0.0 and np.ptp(left) < min(SAME_COLUMN * np.ptp(second), rounding))
 

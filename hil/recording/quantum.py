@@ -7,7 +7,7 @@ from hil.arrays import FloatArray
 _WHOLE = 0.05  # deviation from a whole number of steps up to which a difference is counted
 _COUNTED = 0.9  # share of the differences that must be whole numbers of steps
 _FEWEST = 100  # differences that tell a step
-_SINGLE = 2.5e-7  # of a number: rounding in single precision, both ways
+SINGLE = 2.5e-7  # of a number: rounding in single precision, both ways
 _STEPS = (20, 60, 200, 600)  # largest differences that are counted, in steps
 
 DIGITS = 1e-6  # relative deviation from a power of ten below which a step is that of printed digits
@@ -29,7 +29,7 @@ def count_of(values: FloatArray) -> float | None:
     if step is None or np.ptp(np.round(np.abs(changes) / step)) > 0.0:
         return step
     bends = np.diff(changes)
-    if np.count_nonzero(np.abs(bends) > _SINGLE * np.max(np.abs(values))) < _FEWEST:
+    if np.count_nonzero(np.abs(bends) > SINGLE * np.max(np.abs(values))) < _FEWEST:
         return step
     finer = _step(bends, values)
     return None if finer is None else min(step, finer)

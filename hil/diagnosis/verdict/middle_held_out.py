@@ -11,7 +11,7 @@ from typing import NamedTuple
 from hil.diagnosis.search.refits import carried, over
 from hil.diagnosis.stages import Prepared, Searched, Tested
 from hil.diagnosis.verdict.held_out import test_on_held_out
-from hil.diagnosis.wording import HELD_OUT_NOTE, MIDDLE_PART, title, whole_name
+from hil.diagnosis.wording import HELD_OUT_NOTE, MIDDLE_PART, part_of, title, whole_name
 from hil.identification.dataset import Dataset, in_turn
 from hil.identification.estimator import Fit
 from hil.identification.measured import Measured
@@ -44,13 +44,15 @@ def test_inside_time(searched: Searched) -> Tested:
 
 
 def with_middle_held_out(searched: Searched, term: Term) -> Searched | None:
-    """The fits of a search with the middle of each recording held out; None unless `split` held out their ends.
+    """The fits of a search with the middle of each recording held out; None unless `split` held out ends alone.
 
     `term` is the reason, for the note.
     """
     prepared, final = searched.prepared, searched.final
+    ends = prepared.held_out.runs
     by_split = any(note.startswith(HELD_OUT_NOTE) for note in prepared.notes)
-    parts = _parts(prepared.train.runs, prepared.held_out.runs) if by_split else None
+    inside = any(part_of(run.name) == MIDDLE_PART for run in ends)
+    parts = _parts(prepared.train.runs, ends) if by_split and not inside else None
     if parts is None:
         return None
     data, own = prepared.train.over(parts.train), final.data.over(parts.train)
@@ -63,9 +65,9 @@ def with_middle_held_out(searched: Searched, term: Term) -> Searched | None:
         "with time; the end, outside the time of the rest, is predicted worse with it."
     )
     notes = (*(one for one in prepared.notes if not one.startswith(HELD_OUT_NOTE)), note)
-    inside: Prepared = replace(prepared, train=data, held_out=data.over(parts.middle), notes=notes)
+    parted: Prepared = replace(prepared, train=data, held_out=data.over(parts.middle), notes=notes)
     given, nominal = carried(data, searched.given), over(data, searched.nominal)
-    return replace(searched, prepared=inside, given=given, nominal=nominal, final=over(own, final))
+    return replace(searched, prepared=parted, given=given, nominal=nominal, final=over(own, final))
 
 
 def _goes_on(term: Term) -> bool:

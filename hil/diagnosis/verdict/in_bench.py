@@ -49,9 +49,19 @@ def in_bench(final: Fit, held_out: Dataset, changes: Collection[str] = ()) -> st
         changes_too = any(f"{entry.effect}.{one.name}" in changes for one in mechanism.parameters)
         if clear and not changes_too and matters(final, kept, held_out if held_out.runs else final.data):
             term = Term(entry.effect, entry.variant, entry.values)
-            told.append(sentence(term, final.bench, TermErrors(known, known[mechanism.strength])))
+            text = sentence(term, final.bench, TermErrors(known, known[mechanism.strength]))
+            told.append(text + _before(kept, final, known[mechanism.strength]))
     where = "The bench file has already, here refitted" if final.jacobian.size else "The bench file has already"
     return f"{where}: {' '.join(told)}" if told else ""
+
+
+def _before(kept: MechanismEntry, final: Fit, error: float) -> str:
+    """The strength that the bench file gives, if the fit departs from it by more than its errors; else empty."""
+    hypothesis, mechanism = final.hypothesis, BY_ID[kept.effect]
+    given = hypothesis.bench.mechanisms[hypothesis.resolved.bench.mechanisms.index(kept)].active()
+    before, after = (entry.values[mechanism.strength] for entry in (given, kept.active()))
+    unit = unit_of(mechanism.parameters[mechanism.strength].name)
+    return f" It is {quantity(before, unit)} in the bench file." if abs(after - before) > SIGMAS * error > 0.0 else ""
 
 
 def matters(fit: Fit, entry: MechanismEntry, data: Dataset) -> bool:

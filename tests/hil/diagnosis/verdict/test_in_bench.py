@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from diagnosis_runs import bench, dataset, evaluated, recorded
+from diagnosis_runs import bench, dataset, evaluated, fitted, recorded
 
 from hil.bench.bench_file import Bench, MechanismEntry
 from hil.diagnosis.verdict.in_bench import in_bench, matters
@@ -30,6 +30,15 @@ def test_a_load_is_told_if_it_is_more_than_the_torque_left(load_n_m: float, told
     said = in_bench(fit, dataset([run], owner))
     assert ("A constant load of 0.500 N m: a weight, a preload, or an offset" in said) is told
     assert "such as a weight" not in said
+
+
+@pytest.mark.parametrize(("file_n_m", "told"), [(0.3, " It is 0.300 N m in the bench file."), (0.5, "")])
+def test_a_load_that_departs_from_the_bench_file_is_told_with_both_values(file_n_m: float, told: str) -> None:
+    owner = with_load(file_n_m)
+    data = dataset([take(recorded(bench(), Term("constant_load", 0, (0.5,))), owner)], owner)
+    said = in_bench(fitted(Hypothesis(owner), data), data)
+    assert "A constant load of 0.500 N m" in said
+    assert said.endswith(f"torque channel.{told}")
 
 
 @pytest.mark.parametrize(("late_s", "told"), [(-0.0048, "torque is recorded 4.30 ms after it acts"), (-0.0005, "")])

@@ -88,13 +88,20 @@ def moment_of_change(
 
 
 def steady_change(
-    parts: Sequence[ResidualSeries], columns: Sequence[Columns], times_s: Sequence[FloatArray], name: str
+    parts: Sequence[ResidualSeries],
+    columns: Sequence[Columns],
+    times_s: Sequence[FloatArray],
+    name: str,
+    asked: int = 1,
 ) -> SteadyChange | None:
-    """The rate at which a coefficient changes, with 1(t >= t1) replaced by t; None where rows are few."""
+    """The rate at which a coefficient changes, with 1(t >= t1) replaced by t; None where rows are few.
+
+    `asked`: number of coefficients of which the caller takes the surest.
+    """
     rows = _in_turn(parts, columns, times_s)
     if rows is None:
         return None
-    found = _changed(rows, rows.names.index(name), rows.time_s - float(np.mean(rows.time_s)), 1)
+    found = _changed(rows, rows.names.index(name), rows.time_s - float(np.mean(rows.time_s)), asked)
     return SteadyChange(name, found[0], float(np.ptp(rows.time_s)), found[1]) if found else None
 
 

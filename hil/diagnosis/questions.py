@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.moment_of_change import MomentOfChange, SteadyChange, moment_of_change, steady_change
-from hil.diagnosis.result import CLOCK, MOMENT
+from hil.diagnosis.result import CLOCK, MOMENT, TREND
 from hil.identification.dataset import Dataset
 from hil.identification.derivatives import MeasuredMotion
 from hil.identification.hypothesis import Hypothesis
@@ -107,9 +108,9 @@ def over_time(hypothesis: Hypothesis, data: Dataset) -> Question:
 def change_over_time(
     data: Dataset, parts: Sequence[ResidualSeries], plain: PlainModel
 ) -> MomentOfChange | SteadyChange | None:
-    """How a coefficient of the plain model, or the delay of the torque, changes: at a moment, or that delay steadily.
+    """How a coefficient of the plain model, or the delay of the torque, changes: at a moment, or steadily.
 
-    The one of less chance; None where the rows tell none.
+    The one that explains more if chance makes neither, else that of less chance; None where the rows tell none.
     """
     turning = plain.load_ratio if "sine" in plain.fit.names else None  # an arc that tells gravity
     columns = [
@@ -120,11 +121,12 @@ def change_over_time(
     times_s = [run.time_s for run in data.runs]
     if not any(one[LATENESS][part.rows].any() for one, part in zip(columns, parts, strict=True)):  # one speed
         columns = [{name: one[name] for name in one if name != LATENESS} for one in columns]
-    moment = moment_of_change(parts, columns, times_s)
-    steady = steady_change(parts, columns, times_s, LATENESS) if LATENESS in columns[0] else None
-    if steady and not (moment and moment.course.p <= steady.course.p):
-        return steady
-    return moment
+    steady = [steady_change(parts, columns, times_s, name, len(columns[0])) for name in columns[0]]
+    surest = min(filter(None, steady), key=lambda one: one.course.p, default=None)
+    told = [one for one in (moment_of_change(parts, columns, times_s), surest) if one]
+    if told and all(one.course.p < CRITERIA.significance for one in told):
+        return max(told, key=lambda one: one.course.energy)
+    return min(told, key=lambda one: one.course.p, default=None)
 
 
 def clocks_of_encoders(data: Dataset, parts: Sequence[ResidualSeries]) -> SteadyChange | None:
@@ -149,7 +151,9 @@ def clocks_of_encoders(data: Dataset, parts: Sequence[ResidualSeries]) -> Steady
 
 def about(change: MomentOfChange | SteadyChange) -> Question:
     """The question that a change over time answers."""
-    return Question(CLOCK if isinstance(change, SteadyChange) else MOMENT, "s", "", (), change=change)
+    late = change.coefficient in (LATENESS, ENCODER_LATENESS)
+    name = MOMENT if isinstance(change, MomentOfChange) else CLOCK if late else TREND
+    return Question(name, "s", "", (), change=change)
 
 
 def _of_lateness(moved: MeasuredMotion, plain: PlainModel, period_s: float) -> FloatArray:

@@ -141,6 +141,7 @@ AT_FLOOR = (
     "Block by block, with measured inputs, the residuals of all channels are within the noise of positions and torque."
 )
 MOMENT = "moment"  # what a structure depends on where the axis is another one from a moment on
+TREND = "trend"  # where a parameter of the axis changes at one rate
 CLOCK = "clock"  # where the torque is recorded later and later, or earlier and earlier
 NO_STRUCTURE = "(no structure)"  # behind a channel whose remainder depends on nothing
 

@@ -6,7 +6,18 @@ from collections.abc import Sequence
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.improvement import improvement
 from hil.diagnosis.open_questions import cannot_show
-from hil.diagnosis.result import AT_FLOOR, CLOCK, MOMENT, NO_STRUCTURE, AxisChange, Finding, Result, TorqueLeft, Verdict
+from hil.diagnosis.result import (
+    AT_FLOOR,
+    CLOCK,
+    MOMENT,
+    NO_STRUCTURE,
+    TREND,
+    AxisChange,
+    Finding,
+    Result,
+    TorqueLeft,
+    Verdict,
+)
 from hil.diagnosis.value import Correction
 from hil.diagnosis.wording import listed, named, spoken, titles
 from hil.identification.coordinates import DELAY
@@ -176,7 +187,7 @@ def _depends(result: Result) -> str:
 
     Empty without a structure.
     """
-    told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over in (MOMENT, CLOCK)]
+    told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over in (MOMENT, TREND, CLOCK)]
     maps = "".join(
         f" On held-out motion a map of the {one.effect.removeprefix('unnamed_').replace('_', ' ')} leaves "
         f"{percent(one.held_out_after / one.held_out_before)} of that residual (rms; bench.diagnosed.yaml has it)."

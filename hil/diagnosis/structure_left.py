@@ -87,7 +87,7 @@ class Dependence:
         value, low, high = (float(one) for one in (found.means[at], found.edges[at], found.edges[at + 1]))
         more = "more" if value > 0.0 else "less"
         if (change := question.change) is not None:
-            told = _apart(change) if isinstance(change, SteadyChange) else _changed(change, drive_unit)
+            told = _steadily(change, drive_unit) if isinstance(change, SteadyChange) else _changed(change, drive_unit)
             return f"{told} ({by_chance(found.p)})"
         if self.channel == TORQUE:
             what = f"the axis needs {quantity(abs(value), drive_unit)} {more} torque than the twin"
@@ -114,6 +114,16 @@ def _changed(change: MomentOfChange, drive_unit: str) -> str:
     size = quantity(abs(change.change), unit)
     more = "larger" if change.change > 0.0 else "smaller"
     return f"from {change.moment_s:.2f} s on {name} is {size} {more} than before"
+
+
+def _steadily(steady: SteadyChange, drive_unit: str) -> str:
+    """Say by how much a coefficient changes, or that two clocks run apart."""
+    if steady.coefficient in (LATENESS, ENCODER_LATENESS):
+        return _apart(steady)
+    name, unit = coefficient(steady, drive_unit)
+    change = steady.rate * steady.duration_s
+    way = "grows" if change > 0.0 else "falls"
+    return f"{name} {way} by {quantity(abs(change), unit)} within {quantity(steady.duration_s, 's')}"
 
 
 def _apart(steady: SteadyChange) -> str:

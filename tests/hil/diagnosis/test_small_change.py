@@ -13,6 +13,7 @@ from hil.commands.identify import identify
 from hil.commands.import_ import import_
 from hil.diagnosis.moment_of_change import SteadyChange
 from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.result import TREND
 from hil.diagnosis.structure_left import TORQUE, structure_left
 from hil.explanation import explain
 from hil.identification.intended_motion import measured_motion
@@ -24,9 +25,9 @@ ROWS, AT = 9000, 4000
 HEAVIER, NOISE_N_M = 1.08, 0.08
 
 
-def recorded(folder: Path, inertia: np.ndarray, friction_n_m: np.ndarray) -> Path:
+def recorded(folder: Path, inertia: np.ndarray, friction_n_m: np.ndarray, load_n_m: np.ndarray | float = 0.0) -> Path:
     columns = axis(ROWS, inertia_kg_m2=inertia)
-    columns["torque"] += (friction_n_m - COULOMB_N_M) * np.sign(columns["speed"])
+    columns["torque"] += (friction_n_m - COULOMB_N_M) * np.sign(columns["speed"]) + load_n_m
     columns["torque"] += np.random.default_rng(5).normal(0.0, NOISE_N_M, ROWS)
     return write(folder / "log.csv", renamed(columns, t="time_s", angle="motor_angle_rad", torque="torque_Nm"))
 
@@ -136,3 +137,27 @@ def test_rows_that_a_logger_lost_are_a_shift_of_the_clocks(tmp_path: Path) -> No
     (delay,) = result.change.parameters
     assert delay.values[1].value - delay.values[0].value == pytest.approx(9e-3, abs=5e-4)
     assert result.change.moment_s == pytest.approx(1e-3 * AT, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("friction_n_m", "load_n_m", "told"),
+    [(0.03, 0.0, "the Coulomb friction grows by"), (0.0, -0.03, "the load falls by"), (0.0, 0.0, "")],
+)
+def test_what_changes_steadily_is_told_with_its_change(
+    friction_n_m: float, load_n_m: float, told: str, tmp_path: Path
+) -> None:
+    """By less than half of the noise of a row within the recording."""
+    share = np.arange(ROWS) / ROWS
+    drifting = recorded(
+        tmp_path, np.full(ROWS, INERTIA_KG_M2), COULOMB_N_M + friction_n_m * share, load_n_m=load_n_m * share
+    )
+    import_(drifting, None, tmp_path / "log.parquet", None, None)
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    left = structure_left(fit_nominal_parameters(prepared.train), prepared.held_out)
+    trends = [(one.question.change, one.in_words("N m")) for one in left if one.question.name == TREND]
+    assert len(trends) == bool(told)
+    for change, words in trends:
+        assert isinstance(change, SteadyChange)
+        assert change.rate * change.duration_s == pytest.approx(friction_n_m + load_n_m, rel=0.15)
+        assert told in words

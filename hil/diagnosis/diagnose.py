@@ -5,14 +5,15 @@ from collections.abc import Sequence
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
+from hil.diagnosis.preparation.middle_held_out import goes_on, named_over_time, with_middle_held_out
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone, without_open_delay
 from hil.diagnosis.reporting import report
 from hil.diagnosis.search.forward_selection import search
 from hil.diagnosis.stages import Judged, Prepared, Progress
 from hil.diagnosis.time_left import usual_budget_s, with_time_left
+from hil.diagnosis.verdict.inside_time import test_inside_time
 from hil.diagnosis.verdict.judge import judge
-from hil.diagnosis.verdict.middle_held_out import test_inside_time
 from hil.diagnosis.verdict.reproduction import behind_plain, with_less_torque
 from hil.errors import InputError
 from hil.identification.parallel import one_blas_thread
@@ -53,6 +54,11 @@ def diagnose(
         return judge(test_inside_time(searched))
 
     judged = answer(prepared)
+    in_time = time.process_time() < end_s
+    if in_time and goes_on(judged) and (inside := with_middle_held_out(judged.tested.searched.prepared)):
+        progress("searching again with the middle of the recordings held out")
+        again = answer(inside)
+        judged = again if named_over_time(again) else judged
     for simpler in (as_one_inertia, as_plant_alone):
         in_time = time.process_time() < end_s
         if in_time and behind_plain(judged) and (other := simpler(judged.tested.searched.prepared)):

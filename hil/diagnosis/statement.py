@@ -155,7 +155,7 @@ def _unexplained(result: Result) -> str:
     if result.unexplained.description != AT_FLOOR:
         return f": {result.unexplained.description}{_depends(result)}"
     if result.structure:
-        return f"; below the noise of a row, {result.structure[0].text}."
+        return f"; below the noise of a row, {'; '.join(_strongest(result))}."
     told = _leaves(result.torque_left)
     return f"; every channel is within its noise{f', and the twin {told}' if told else ''}."
 
@@ -182,12 +182,14 @@ def _together(left: TorqueLeft | None) -> str:
     )
 
 
-def _depends(result: Result) -> str:
-    """The strongest structure that is left, the moment from which the axis is another one, and what maps of it leave.
+def _strongest(result: Result) -> list[str]:
+    """The strongest structure that is left, and how a parameter or a clock changes over time."""
+    return [one.text for at, one in enumerate(result.structure) if at == 0 or one.over in (MOMENT, TREND, CLOCK)]
 
-    Empty without a structure.
-    """
-    told = [one.text for at, one in enumerate(result.structure) if at == 0 or one.over in (MOMENT, TREND, CLOCK)]
+
+def _depends(result: Result) -> str:
+    """What is left depends on, and what maps of it leave; empty without a structure."""
+    told = _strongest(result)
     maps = "".join(
         f" On held-out motion a map of the {one.effect.removeprefix('unnamed_').replace('_', ' ')} leaves "
         f"{percent(one.held_out_after / one.held_out_before)} of that residual (rms; bench.diagnosed.yaml has it)."

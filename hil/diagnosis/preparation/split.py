@@ -25,7 +25,7 @@ _LONG_REST = 0.2  # of the recording: a third keeps less than half of its motion
 _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encoder
 
 
-class _Parts(NamedTuple):
+class _Cut(NamedTuple):
     """The parts of a recording for training, in order of time, the part held out, and the travel of all of it."""
 
     train: tuple[Recording, ...]
@@ -53,16 +53,16 @@ def split(
     return train, rest
 
 
-def _cut(recording: Recording, first: float, last: float) -> _Parts:
+def _cut(recording: Recording, first: float, last: float) -> _Cut:
     """Cut out what is between two shares of the motion, at rest near them."""
     (begin, end), travel = _moving(recording), float(np.ptp(_position(recording)))
     row, stop = (_standstill(recording, begin + round(share * (end - begin))) for share in (first, last))
     before, after = _part(recording, slice(0, row), FIRST_PART), _part(recording, slice(stop, None), LAST_PART)
     if first <= 0.0:
-        return _Parts((after,), _part(recording, slice(0, stop), FIRST_PART), travel)
+        return _Cut((after,), _part(recording, slice(0, stop), FIRST_PART), travel)
     if last >= 1.0:
-        return _Parts((before,), _part(recording, slice(row, None), LAST_PART), travel)
-    return _Parts((before, after), _part(recording, slice(row, stop), MIDDLE_PART), travel)
+        return _Cut((before,), _part(recording, slice(row, None), LAST_PART), travel)
+    return _Cut((before, after), _part(recording, slice(row, stop), MIDDLE_PART), travel)
 
 
 def _led_in(recording: Recording, part: Recording) -> Recording:
@@ -110,7 +110,7 @@ def _position(recording: Recording) -> FloatArray:
     return next((values for values in given if values is not None), np.zeros(len(recording)))
 
 
-def _merits(parts: _Parts) -> tuple[bool, ...]:
+def _merits(parts: _Cut) -> tuple[bool, ...]:
     """What is good about a cut, the most important first (see `split`)."""
     return (
         max(map(_top_speed, parts.train)) >= _COVERED * _top_speed(parts.held_out),
@@ -120,7 +120,7 @@ def _merits(parts: _Parts) -> tuple[bool, ...]:
     )
 
 
-def _within(parts: _Parts) -> float:
+def _within(parts: _Cut) -> float:
     """Share of the rows held out that lie where training was, but for noise and drift (see `_STARTED`)."""
     known, there = np.concatenate([*map(_position, parts.train)]), _position(parts.held_out)
     if not known.size or not there.size:

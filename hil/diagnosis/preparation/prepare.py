@@ -28,7 +28,7 @@ def prepare(train: Sequence[Recording], validate: Sequence[Recording], bench: Be
     usable = reduced(law.bench, [*train, *whole, *validate])
     train, whole, validate = ([completed(run, usable) for run in runs] for runs in (train, whole, validate))
     if not validate:
-        train, validate = split(train, lambda parts: not preflight(list(parts), usable).problems)
+        train, validate = split(train)
         train += whole
         notes = (*notes, held_out_note(validate))
     twice = [held.name for held in validate for run in train if same(held, run)]

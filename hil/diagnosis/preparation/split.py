@@ -1,21 +1,19 @@
 """Split of recordings into a part for training and a part that is held out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hil.arrays import FloatArray
-from hil.diagnosis.wording import FIRST_PART, HELD_OUT_NOTE, LAST_PART, MIDDLE_PART, part_of
+from hil.diagnosis.wording import FIRST_PART, HELD_OUT_NOTE, LAST_PART
 from hil.identification.measured import LEAD_IN
 from hil.recording.recording import Recording
 
-# Begin and end of what is held out, as shares of the motion; of equal cuts the first is taken. Two thirds for training
-# is a common split. The third before the middle comes last: even of a single stroke it has the places and the speeds
-# of the rest, but cuts it in two.
-CUTS = ((2.0 / 3.0, 1.0), (0.0, 1.0 / 3.0), (0.5, 1.0), (0.0, 0.5), (1.0 / 6.0, 0.5))
+# Share of the motion before the cut, and whether the part after it is held out; the first that fits is taken. Two
+# thirds for training is a common split.
+CUTS = ((2.0 / 3.0, True), (1.0 / 3.0, False), (0.5, True), (0.5, False))
 # Least top speed in training over that held out, and least share of the rows held out at positions of the training:
 # beyond, friction and inertia, or what depends on the place, would be extrapolated.
 _COVERED = 0.8
@@ -25,44 +23,33 @@ _LONG_REST = 0.2  # of the recording: a third keeps less than half of its motion
 _SPEED_S = 0.02  # time over which a speed is averaged: many counts of an encoder
 
 
-class _Cut(NamedTuple):
-    """The parts of a recording for training, in order of time, the part held out, and the travel of all of it."""
+def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Recording]]:
+    """Split each recording into a part of its motion for training and one that is held out, as `CUTS` order them.
 
-    train: tuple[Recording, ...]
-    held_out: Recording
-    travel: float
-
-
-def split(
-    recordings: Sequence[Recording], usable: Callable[[Sequence[Recording]], bool] = bool
-) -> tuple[list[Recording], list[Recording]]:
-    """Split each recording into one or two parts of its motion for training and one held out, by the best of `CUTS`.
-
-    All keep their time. By the best cut all parts are `usable` (default: every part is), training is as fast as what is
-    held out, moves both ways (of motion in one direction friction and a load are one offset) and goes as far, and what
-    is held out moves both ways, in this order. A part that begins in motion has rows before it, from which the twin
-    gets its state there: every row is evaluated in one part.
+    Both keep their time. The training part is as fast as the other and goes as far, and both move both ways, where a
+    cut makes it so; else the training part does: of motion in one direction friction and a load are one offset. A part
+    that begins in motion has rows before it, from which the twin gets its state there: every row is evaluated in one
+    part.
     """
-    train, rest = list[Recording](), list[Recording]()
+    train, rest = [], []
     for recording in recordings:
-        ranked = sorted((_cut(recording, *shares) for shares in CUTS), key=_merits, reverse=True)
-        led = [[_led_in(recording, part) for part in (*parts.train, parts.held_out)] for parts in ranked]
-        *parts, held_out = next(filter(usable, led), led[0])
-        train += parts
-        rest.append(held_out)
+        begin, end = _moving(recording)
+        travel = float(np.ptp(_position(recording)))
+        found = [_cut(recording, begin + round(share * (end - begin)), last) for share, last in CUTS]
+        fast = [parts for parts in found if _covers(*parts)] or found[:1]
+        told = [parts for parts in fast if _moves_both_ways(parts[0], travel)] or fast
+        inside = [parts for parts in told if _within(*parts, travel) >= _COVERED] or told
+        parts = next((parts for parts in inside if _moves_both_ways(parts[1], travel)), inside[0])
+        train.append(_led_in(recording, parts[0]))
+        rest.append(_led_in(recording, parts[1]))
     return train, rest
 
 
-def _cut(recording: Recording, first: float, last: float) -> _Cut:
-    """Cut out what is between two shares of the motion, at rest near them."""
-    (begin, end), travel = _moving(recording), float(np.ptp(_position(recording)))
-    row, stop = (_standstill(recording, begin + round(share * (end - begin))) for share in (first, last))
-    before, after = _part(recording, slice(0, row), FIRST_PART), _part(recording, slice(stop, None), LAST_PART)
-    if first <= 0.0:
-        return _Cut((after,), _part(recording, slice(0, stop), FIRST_PART), travel)
-    if last >= 1.0:
-        return _Cut((before,), _part(recording, slice(row, None), LAST_PART), travel)
-    return _Cut((before, after), _part(recording, slice(row, stop), MIDDLE_PART), travel)
+def _cut(recording: Recording, row: int, last: bool) -> tuple[Recording, Recording]:
+    """Return the part for training and the one held out, cut at rest near a row; `last`: the last one is held out."""
+    cut = _standstill(recording, row)
+    parts = _part(recording, slice(0, cut), FIRST_PART), _part(recording, slice(cut, None), LAST_PART)
+    return parts if last else (parts[1], parts[0])
 
 
 def _led_in(recording: Recording, part: Recording) -> Recording:
@@ -80,10 +67,10 @@ def _led_in(recording: Recording, part: Recording) -> Recording:
 
 def held_out_note(held_out: Sequence[Recording]) -> str:
     """Sentence on the parts that `split` holds out."""
-    other = [one.name for one in held_out if part_of(one.name) != LAST_PART]
+    first = [one.name for one in held_out if one.name.endswith(f"({FIRST_PART})")]
     text = f"{HELD_OUT_NOTE} the last part of each recording is used for validation"
     return (
-        f"{text}, but {', '.join(other)}, since the rest alone reaches its speed and travel." if other else f"{text}."
+        f"{text}, but {', '.join(first)}, since the rest alone reaches its speed and travel." if first else f"{text}."
     )
 
 
@@ -110,30 +97,26 @@ def _position(recording: Recording) -> FloatArray:
     return next((values for values in given if values is not None), np.zeros(len(recording)))
 
 
-def _merits(parts: _Cut) -> tuple[bool, ...]:
-    """What is good about a cut, the most important first (see `split`)."""
-    return (
-        max(map(_top_speed, parts.train)) >= _COVERED * _top_speed(parts.held_out),
-        _moves_both_ways(parts.train, parts.travel),
-        _within(parts) >= _COVERED,
-        _moves_both_ways([parts.held_out], parts.travel),
-    )
+def _covers(train: Recording, held_out: Recording) -> bool:
+    """True if the training part is about as fast as the part that is held out."""
+    return _top_speed(train) >= _COVERED * _top_speed(held_out)
 
 
-def _within(parts: _Cut) -> float:
-    """Share of the rows held out that lie where training was, but for noise and drift (see `_STARTED`)."""
-    known, there = np.concatenate([*map(_position, parts.train)]), _position(parts.held_out)
+def _within(train: Recording, held_out: Recording, travel: float) -> float:
+    """Share of the rows held out that lie where the training part was, but for noise and drift (see `_STARTED`)."""
+    known, there, margin = _position(train), _position(held_out), _STARTED * travel
     if not known.size or not there.size:
         return 0.0
-    margin = _STARTED * parts.travel
     return float(np.mean((there >= np.min(known) - margin) & (there <= np.max(known) + margin)))
 
 
-def _moves_both_ways(parts: Sequence[Recording], travel: float) -> bool:
-    """True if parts move forwards and backwards by a share of the travel (in the unit of the position)."""
-    moves = [position for position in map(_position, parts) if position.size]
-    forwards = max((float(np.max(one - np.minimum.accumulate(one))) for one in moves), default=0.0)
-    backwards = max((float(np.max(np.maximum.accumulate(one) - one)) for one in moves), default=0.0)
+def _moves_both_ways(part: Recording, travel: float) -> bool:
+    """True if a part moves forwards and backwards by a share of the travel (in the unit of the position)."""
+    position = _position(part)
+    if not position.size:
+        return False
+    forwards = float(np.max(position - np.minimum.accumulate(position)))
+    backwards = float(np.max(np.maximum.accumulate(position) - position))
     return min(forwards, backwards) > _BOTH_WAYS * travel
 
 

@@ -45,7 +45,8 @@ def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) 
             raise InputError(
                 f"{recording.name}: gaps cut it into {len(parts)} parts, none usable: {reasons[longest.name]}"
             )
-        unsplit = [part for part in usable if to_split and _reason(_pieces(part), bench)]
+        pieces = {part.name: [one for half in split([part]) for one in half] for part in usable if to_split}
+        unsplit = [part for part in usable if to_split and _reason(pieces[part.name], bench)]
         kept += [part for part in usable if part not in unsplit]
         whole += unsplit
         notes.append(
@@ -57,11 +58,6 @@ def usable_parts(recordings: Sequence[Recording], bench: Bench, to_split: bool) 
         return UsableParts(tuple(kept or whole), tuple(whole if kept else ()), (), tuple(notes))
     notes.append(f"No part is long enough to hold out a third of it: {whole[-1].name} is held out as a whole.")
     return UsableParts(tuple(whole[:-1]), (), (whole[-1],), tuple(notes))
-
-
-def _pieces(part: Recording) -> list[Recording]:
-    train, held_out = split([part])
-    return [*train, *held_out]
 
 
 def _reason(parts: Sequence[Recording], bench: Bench) -> str:

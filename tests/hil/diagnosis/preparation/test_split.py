@@ -90,34 +90,6 @@ def test_the_part_held_out_moves_both_ways() -> None:
     assert len(train) > 0.4 * len(feeds)
 
 
-def single_stroke() -> Recording:
-    """One stroke from rest to rest: no end of it lies where the rest of it was."""
-    shares = np.linspace(0.0, 1.0, ROWS)
-    position = 0.4 * (shares - np.sin(2.0 * np.pi * shares) / (2.0 * np.pi))
-    columns = swinging(rest=False).columns | {"motor_position_m": position, "position_command_m": position}
-    return Recording("stroke", columns, PERIOD_S)
-
-
-def test_of_a_single_stroke_the_middle_is_held_out() -> None:
-    """An end would be extrapolated: a lead error of the whole travel shows only as an offset where little is moved."""
-    stroke = single_stroke()
-    (first, last), (held_out,) = split([stroke])
-    assert [part.name for part in (first, held_out, last)] == [
-        f"stroke ({part} part)" for part in ("first", "middle", "last")
-    ]
-    assert (held_out.metadata[LEAD_IN], last.metadata[LEAD_IN]) == (ROWS / 6, ROWS / 2)
-    rows = [len(part) - part.metadata.get(LEAD_IN, 0) for part in (first, held_out, last)]
-    assert sum(rows) == ROWS
-    assert "stroke (middle part)" in held_out_note([held_out])
-
-
-def test_a_cut_whose_parts_are_not_usable_is_left_out() -> None:
-    (train,), (held_out,) = split([single_stroke()], lambda parts: len(parts) == 2)
-    assert (train.name, held_out.name) == ("stroke (first part)", "stroke (last part)")
-    (train,), _ = split([swinging(rest=False)], lambda parts: len(parts[0]) < ROWS / 2 + 1)
-    assert len(train) == ROWS / 2
-
-
 def test_training_moves_both_ways() -> None:
     """There and back once, with a turn on the way back: its second half alone would move one way."""
     feeds = moved([(0.15, 0.06)])

@@ -55,7 +55,7 @@ def judge(tested: Tested) -> Judged:
     named = of_plant is Verdict.MISSING_PHYSICS
     open_ones = of_plant is Verdict.UNEXPLAINED and not searched.stopped_at
     beside = structure_left(final if named else refit.fit, held_out) if named or open_ones else ()
-    alone = structure_left(refit.fit, held_out) if named and _drifts(beside) else ()
+    alone = structure_left(refit.fit, held_out) if named else ()
     of_clocks = _clocks_need_less((refit.fit, alone), (final, beside), held_out)
     if of_clocks:
         of_plant, named, open_ones, beside = Verdict.UNEXPLAINED, False, not searched.stopped_at, alone
@@ -190,7 +190,7 @@ def _clocks_need_less(
         missed = left_by_twin(one.hypothesis, every, plain)
         if missed is None:
             return False
-        left.append((1.0 - max(drift.explained for drift in _drifts(found))) * missed**2)
+        left.append((1.0 - max((drift.explained for drift in _drifts(found)), default=0.0)) * missed**2)
     return left[0] < left[1]
 
 

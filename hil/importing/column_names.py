@@ -91,8 +91,9 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         unit = _unit_of_object(name)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
-    if unit == "N m" and quantity is Quantity.POSITION and not strange and not _any(words, ("moment",)):
-        unit = "nm"
+    of_scale = quantity is Quantity.UNKNOWN and _any(words, known.linear_scale)
+    if unit == "N m" and (quantity is Quantity.POSITION or of_scale) and not strange and not _any(words, ("moment",)):
+        unit, quantity = "nm", Quantity.POSITION
     elif unit == "rev" and quantity not in (Quantity.POSITION, Quantity.UNKNOWN):
         unit = None  # speed_rev is a reversal
     elif unit in ("%", "permille") and quantity in _MOTION:

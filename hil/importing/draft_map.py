@@ -29,7 +29,7 @@ from hil.importing.rows import at_regular_times, complete_rows, filled_in, witho
 from hil.importing.slow_gaps import moving_little, with_gaps_filled
 from hil.importing.unit_choice import are_counts
 from hil.importing.units import unit_named
-from hil.importing.wraps import unwrapped, wrap_range
+from hil.importing.wraps import lost_by, unwrapped, wrap_range
 
 _TURNS = {360.0: "deg", 2.0 * np.pi: "rad"}  # unit of an angle by the range after which it starts again
 
@@ -75,7 +75,11 @@ def draft_map(
     dense = filled | {"time_s": clock.time_s}
     dense = with_gaps_filled(dense)[0] if moving_little(dense, named) else dense
     regular = at_regular_times(path, {name: dense[name] for name in filled}, dense["time_s"])
+    found = {name: lost_by(name, size, filled, labels, regular.period_s) for name, size in wraps.items()}
+    lost = {name: f"{speed} goes half of its range and more from row to row" for name, speed in found.items() if speed}
+    labels |= {name: replace(labels[name], quantity=Quantity.OTHER) for name in lost}
     roles = find_roles(str(path), regular.longest_part(), labels, regular.period_s, axis, table.constants)
+    roles.left_out |= lost
     if roles.motor is None and roles.motor_velocity is None:
         may_be = may_be_asked(regular.longest_part(), labels)
         draft = _without_motion(table, clock, roles, may_be, [*table.notes, *own.notes, *clock.unsure])

@@ -154,6 +154,7 @@ class Lexicon(_Entry):
     steps: Words
     step_units: Words
     encoder: Words
+    linear_scale: Words
     part: Words
     attached_after: Words
     attached_before: Words

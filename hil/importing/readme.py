@@ -13,10 +13,11 @@ from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.listed_scales import is_raw, is_whole
-from hil.importing.readme_columns import ToldColumn, told_columns
+from hil.importing.readme_columns import SHARES, ToldColumn, told_columns
 from hil.importing.unit_lines import described
 from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
+_POWER = re.compile(r"(?<![\w.,])2(?:\^|\*\*)(\d{1,2})(?![\w.]\d)")  # counts of an encoder: 2^21
 _LONGEST = 1_000_000  # bytes: no README is as long
 
 
@@ -49,7 +50,7 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     check_file(readme, "a text of the owner", _LONGEST)
     raw = readme.read_bytes().splitlines()
     encoding = encoding_of(raw)
-    lines = [line.decode(encoding) for line in raw]
+    lines = [_POWER.sub(lambda power: str(1 << int(power[1])), line.decode(encoding)) for line in raw]
     titles = {table.titles.get(name, name): name for name in table.columns}
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
@@ -109,5 +110,5 @@ def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
         return True
     if told.of:
         named = unit_named(table.units.get(name, "")) or label(table.titles.get(name, name)).unit
-        return named == told.of
+        return named == told.of or (told.of in SHARES and named in (None, *SHARES))
     return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

@@ -19,6 +19,10 @@ _NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)
 _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)|:\s")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
 _EQUAL = re.compile(r"(\d+(?:,\d{3})*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)")
+_ONE_TURN = re.compile(  # 524288 Inc = 1 rev
+    r"(?<![\d.,])(\d+)\s*([^\W\d]+)\s*=\s*(?:1|one|eine)\s+(?:\w+[ -])?(?:motor)?(?:turn|rev|umdr|tour|giro|vuelta)",
+    re.IGNORECASE,
+)
 _PER_VOLT = re.compile(r"([+-]?\d+(?:\.\d+|,\d{1,2}(?!\d))?(?:e[+-]?\d+)?)\s*([^\W\d][^\d/]*?)\s*(?:/|\bper\b)\s*(m?V)")
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
@@ -30,6 +34,7 @@ _PER_TURN = re.compile(  # 65536 counts per motor turn
 _CELLS = re.compile(r"\s*\|(.+)\|\s*")  # a row of a table
 _NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
 _SENTENCE = re.compile(r"[.]\s+(?=[A-ZÄÖÜÉÈ])")
+SHARES = ("%", "permille")  # units of a torque over the rated one
 _FEWEST = 3  # columns that a sentence lists: fewer are words
 
 
@@ -137,14 +142,23 @@ def _told(text: str) -> ToldColumn:
     volts = next(filter(None, map(_per_volt, phrases)), None) if unit_named(unit) in (None, "V", "mV") else None
     if volts:
         return volts._replace(words="" if _per_volt(phrases[0]) else phrases[0])
-    equal = next(filter(None, map(_equal, phrases)), None)
-    if equal and (not unit or unit_named(unit) in ("counts", "%", "permille")):
-        return ToldColumn("" if _equal(phrases[0]) else phrases[0], equal[1], equal[0])
     words = phrases[0] if phrases and phrases[0] != unit else ""
     counts = unit_named(unit) == "counts"
     per_turn = next(
-        (int(one[1]) for one in _PER_TURN.finditer(text) if unit_named(without_accents(one[2])) == "counts"), None
+        (
+            int(one[1])
+            for turns in (_PER_TURN, _ONE_TURN)
+            for one in turns.finditer(text)
+            if unit_named(without_accents(one[2])) == "counts"
+        ),
+        None,
     )
+    equal, share = (
+        next(filter(None, map(_equal, phrases)), None),
+        named if (named := unit_named(unit)) in SHARES else "",
+    )
+    if equal and not per_turn and (not unit or counts or share):
+        return ToldColumn("" if _equal(phrases[0]) else words, equal[1], equal[0], of=share or "")
     if (unit and not counts) or per_turn:
         return ToldColumn(words, unit or "counts", per_turn=per_turn)
     steps = (step for part in phrases if (step := _step(part, counts)))
@@ -175,7 +189,9 @@ def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:
 
     A whole number of units may be another size, unless the column is in `counts` or it is said of each.
     """
-    match = _SIZE.match(re.sub(rf"^(?:{'|'.join(lexicon().both)})\s+", "", phrase))
+    match = _SIZE.match(
+        re.sub(rf"^(?:{'|'.join(lexicon().both)}|lsb|(?:1|one) (?:count|digit))\s*=?\s+", "", phrase, flags=re.I)
+    )
     size, rest = (match[0], match.string[match.end() :].strip()) if match else ("", "")
     share, each = bool(_OF_RATED.fullmatch(rest)), bool(_EACH.fullmatch(rest))
     if unit_named(size) == "permille" and (share or each):

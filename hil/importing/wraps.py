@@ -1,10 +1,13 @@
 """Unwrap counters and angles that start again at the end of their range."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from hil.arrays import FloatArray
+from hil.importing.column_names import Label
+from hil.quantities import UNITS
 
 WHOLE_RANGE = 0.8  # of the spread of the values: a smaller jump is no wrap
 _SUDDEN = 5.0  # times the change of the rows around: a motion changes its speed gradually
@@ -13,6 +16,7 @@ _AROUND = 5  # rows before and after, which must run against the jump
 _STAYS = 3  # rows after a wrap without another jump: a spike comes back at once
 _SEVERAL, _ALIKE = 3, 0.8  # jumps by one usual range, and their share: a fast motion, beside which they are not sudden
 _FEW_VALUES = 20  # of a switched signal, whose steps are no wraps
+_LOST = 0.01  # of the rows: a spike of a velocity loses no angle
 _SAME = 0.1  # of the range: by how much the ranges of several wraps may differ
 _CLOSE = 0.01  # relative deviation from a usual range
 _USUAL = (
@@ -94,3 +98,19 @@ def unwrapped(values: FloatArray, size: float) -> FloatArray:
     result = values.copy()
     result[good] = np.unwrap(values[good], period=size)
     return result
+
+
+def lost_by(
+    name: str, size: float, columns: Mapping[str, FloatArray], labels: Mapping[str, Label], period_s: float
+) -> str:
+    """The measured velocity by which a column goes half of its range or more from row to row; "" without one.
+
+    Then no way round is the shortest: both in known units.
+    """
+    si, factor = UNITS.get(labels[name].unit or "", ("", 1.0))
+    for other, values in columns.items():
+        of, per_s = UNITS.get(labels[other].unit or "", ("", 1.0))
+        rows = np.abs(values) * per_s * period_s > 0.5 * size * factor
+        if si and of == f"{si}/s" and not labels[other].command and np.mean(rows[np.isfinite(values)]) > _LOST:
+            return other
+    return ""

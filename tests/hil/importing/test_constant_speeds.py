@@ -30,3 +30,19 @@ def test_files_of_other_speeds_have_the_same_map(rpm: float, tmp_path: Path) -> 
     assert maps[0] == maps[1]
     assert maps[0]["channels"]["motor_position_rad"] == {"column": "angle[deg]", "unit": "deg", "wraps_at": 360.0}
     assert not any("derivative" in note for draft in drafts for note in draft.unsure)
+
+
+def test_an_angle_of_half_a_turn_from_row_to_row_is_no_position(tmp_path: Path) -> None:
+    """By the shortest way round it would turn backwards above 3000 rpm, and so would the sign of the torque."""
+    t = 0.01 * np.arange(1800)
+    rpm = np.interp(t, [1.0, 4.0, 8.0, 14.0, 17.0], [0.0, 3200.0, 3200.0, -3200.0, 0.0])
+    angle = np.mod(np.cumsum(6.0 * rpm) * 0.01, 360.0)
+    torque = 0.2 * np.sign(rpm) + 1e-4 * rpm + 2e-4 * np.gradient(rpm, t)
+    torque += np.random.default_rng(1).normal(0.0, 0.01, t.size)
+    columns = {"t[s]": t, "n[rpm]": np.round(rpm, 1), "angle[deg]": np.round(angle, 2), "M[Nm]": np.round(torque, 3)}
+    draft = draft_map(write(tmp_path / "run.csv", columns))
+    channels = yaml.safe_load(map_text(draft))["channels"]
+    assert "motor_position_rad" not in channels
+    assert {"column": "n[rpm]", "unit": "rpm"} in channels.values()
+    assert "sign" not in channels["torque_n_m"]
+    assert draft.left_out["angle[deg]"] == "n[rpm] goes half of its range and more from row to row"

@@ -9,7 +9,9 @@ import pytest
 from foreign_axis import axis, write
 
 from hil.commands.import_ import import_
+from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
+from hil.importing.lexicon import Quantity
 from hil.importing.readme_columns import told_columns
 from hil.recording.recording import read_recording
 
@@ -23,6 +25,7 @@ CONSTANT = 0.25
         ("trq - 0.1 % of rated torque (1000 = 3.2 Nm)", 3.2e-3),
         ("trq: actual torque, 1 count = 2 mNm", 2e-3),
         ("trq - counts (1,000 counts = 3.2 Nm)", 3.2e-3),
+        ("trq: motor torque, LSB 0.002 Nm", 2e-3),
     ],
 )
 def test_an_equation_tells_the_size_of_a_number(line: str, size: float, tmp_path: Path) -> None:
@@ -33,6 +36,35 @@ def test_an_equation_tells_the_size_of_a_number(line: str, size: float, tmp_path
     import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
     found = read_recording(tmp_path / "out.parquet")["torque_n_m"]
     np.testing.assert_allclose(found, AXIS["torque"], atol=size)
+
+
+def test_a_share_of_the_rated_torque_is_told_by_an_equation(tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "phi[deg]": np.degrees(AXIS["angle"]), "M[%MN]": AXIS["torque"] / 0.032}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(
+        "  phi[deg]  angle, deg\n  M[%MN]    torque in percent of rated (100 = 3.2 Nm)\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "told",
+    ["2^21 counts per rev", "2**21 Inc = 1 rev", "2097152 counts = 1 turn", "2097152 Inc = 1 Motorumdrehung = 4 mm"],
+)
+def test_counts_of_a_turn_may_be_a_power_or_an_equation(told: str, tmp_path: Path) -> None:
+    counts = np.round(AXIS["angle"] / (2.0 * np.pi) * 2**21)
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_inc": counts, "torque_Nm": AXIS["torque"]})
+    (tmp_path / "README.md").write_text(f"- pos_inc: motor encoder, {told}\n- torque_Nm: torque, Nm\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")["motor_position_rad"]
+    np.testing.assert_allclose(found - found[0], AXIS["angle"] - AXIS["angle"][0], atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["scale_nm", "pos_nm"])
+def test_a_linear_scale_in_nm_is_in_nanometres(name: str) -> None:
+    assert (label(name).quantity, label(name).unit) == (Quantity.POSITION, "nm")
+    assert label("load_nm").unit == "N m"
 
 
 @pytest.mark.parametrize("whole", ["largest current 40 A (= 100 % TRQ)", "100 % = 40 A"])

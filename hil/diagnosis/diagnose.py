@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.preparation.middle_held_out import goes_on, named_over_time, with_middle_held_out
+from hil.diagnosis.preparation.middle_held_out import goes_on, names_more, with_middle_held_out
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone, without_open_delay
 from hil.diagnosis.reporting import report
@@ -58,7 +58,7 @@ def diagnose(
     if in_time and goes_on(judged) and (inside := with_middle_held_out(judged.tested.searched.prepared)):
         progress("searching again with the middle of the recordings held out")
         again = answer(inside)
-        judged = again if named_over_time(again) else judged
+        judged = again if names_more(again, judged) else judged
     for simpler in (as_one_inertia, as_plant_alone):
         in_time = time.process_time() < end_s
         if in_time and behind_plain(judged) and (other := simpler(judged.tested.searched.prepared)):

@@ -26,14 +26,24 @@ class _Parts(NamedTuple):
 
 
 def goes_on(judged: Judged) -> bool:
-    """True if friction is left that changes steadily."""
+    """True if friction is left that changes steadily, and no mechanism is named whose law goes on with time."""
     changes = [one.question.change for one in judged.structure]
-    return any(isinstance(one, SteadyChange) and one.coefficient in _FRICTION for one in changes)
+    left = any(isinstance(one, SteadyChange) and one.coefficient in _FRICTION for one in changes)
+    return left and not _over_time(judged)
 
 
-def named_over_time(judged: Judged) -> bool:
-    """True if a mechanism is named whose law goes on with time: a report may tell it as a rate."""
-    return judged.has_findings and any(BY_ID[term.effect].text.rate for term in judged.final.terms)
+def names_more(again: Judged, judged: Judged) -> bool:
+    """True if an answer names all that another one names, and a mechanism whose law goes on with time."""
+    return bool(_over_time(again)) and _named(judged) <= _named(again)
+
+
+def _named(judged: Judged) -> set[str]:
+    return {term.effect for term in judged.final.terms} if judged.has_findings else set()
+
+
+def _over_time(judged: Judged) -> set[str]:
+    """Mechanisms that a report may tell as a rate."""
+    return {effect for effect in _named(judged) if BY_ID[effect].text.rate}
 
 
 def with_middle_held_out(prepared: Prepared) -> Prepared | None:

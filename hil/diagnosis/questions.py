@@ -110,7 +110,8 @@ def change_over_time(
 ) -> MomentOfChange | SteadyChange | None:
     """How a coefficient of the plain model, or the delay of the torque, changes: at a moment, or steadily.
 
-    The one that explains more if chance makes neither, else that of less chance; None where the rows tell none.
+    Steadily the coefficient of least chance; beside the moment the one that explains more if chance makes neither, else
+    that of less chance. None where the rows tell none.
     """
     turning = plain.load_ratio if "sine" in plain.fit.names else None  # an arc that tells gravity
     columns = [

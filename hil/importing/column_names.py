@@ -91,7 +91,8 @@ def label(column: str, unit_text: str = "", words_beside: str = "", of_cells: bo
         unit = _unit_of_object(name)
     of_unit = QUANTITY_OF_UNIT.get(unit or "")
     strange = letter and _strange(words)
-    of_scale = quantity is Quantity.UNKNOWN and _any(words, known.linear_scale)
+    in_nm = "nm" in (unit_text or column) and "Nm" not in f"{unit_text}{column}"  # a torque may be in either
+    of_scale = in_nm and quantity is Quantity.UNKNOWN and not {*words}.isdisjoint(known.linear_scale)
     if unit == "N m" and (quantity is Quantity.POSITION or of_scale) and not strange and not _any(words, ("moment",)):
         unit, quantity = "nm", Quantity.POSITION
     elif unit == "rev" and quantity not in (Quantity.POSITION, Quantity.UNKNOWN):

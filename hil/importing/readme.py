@@ -13,11 +13,12 @@ from hil.importing.foreign_table import ForeignTable
 from hil.importing.header_values import HeaderValue, header_values
 from hil.importing.lexicon import Constant, Quantity
 from hil.importing.listed_scales import is_raw, is_whole
-from hil.importing.readme_columns import SHARES, ToldColumn, told_columns
+from hil.importing.readme_columns import WHOLES, ToldColumn, told_columns
 from hil.importing.unit_lines import described
 from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
-_POWER = re.compile(r"(?<![\w.,])2(?:\^|\*\*)(\d{1,2})(?![\w.]\d)")  # counts of an encoder: 2^21
+# Counts of an encoder, 2^21; not within a sum or a product.
+_POWER = re.compile(r"(?<![\w.,*/^+-])2 ?(?:\^|\*\*) ?(\d{1,2})(?![\w.,]?\d|\s*[-+*/]\s*\d)")
 _LONGEST = 1_000_000  # bytes: no README is as long
 
 
@@ -110,5 +111,5 @@ def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
         return True
     if told.of:
         named = unit_named(table.units.get(name, "")) or label(table.titles.get(name, name)).unit
-        return named == told.of or (told.of in SHARES and named in (None, *SHARES))
+        return named == told.of or (told.of in WHOLES and named is None)
     return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

@@ -19,8 +19,10 @@ _NUMBERED = re.compile(r"[\s*•–-]*(?:[Cc]olumn )?(\d+)(?:[.):]\s*|\s+)(?=\S)
 _PHRASES = re.compile(r"[;()\[\]]|,(?!\d)|:\s")
 _SIZE = re.compile(r"(?:1/)?\d[\d.,e-]*\s*[^\d\s]\S*")
 _EQUAL = re.compile(r"(\d+(?:,\d{3})*)\s*([^\W\d]*)\s*=\s*(\d+(?:[.,]\d+)?)\s*([^\W\d][^\d=]*)")
-_ONE_TURN = re.compile(  # 524288 Inc = 1 rev
-    r"(?<![\d.,])(\d+)\s*([^\W\d]+)\s*=\s*(?:1|one|eine)\s+(?:\w+[ -])?(?:motor)?(?:turn|rev|umdr|tour|giro|vuelta)",
+_ONE_TURN = re.compile(  # 524288 Inc = 1 rev, of the motor
+    r"(?<![\d.,])(\d+)\s*([^\W\d]+)\s*=\s*(?:1|one|eine)\s+(?:(?:motor|full|whole) )?"
+    r"(?:motor)?(?:turn|rev(?:olution)?|umdr\w*|tour|giro|vuelta)\b"
+    r"(?! ?(?:/|per\b|pro\b|of\b|der\b|des\b|\((?:x|×|\d)))",
     re.IGNORECASE,
 )
 _PER_VOLT = re.compile(r"([+-]?\d+(?:\.\d+|,\d{1,2}(?!\d))?(?:e[+-]?\d+)?)\s*([^\W\d][^\d/]*?)\s*(?:/|\bper\b)\s*(m?V)")
@@ -34,7 +36,7 @@ _PER_TURN = re.compile(  # 65536 counts per motor turn
 _CELLS = re.compile(r"\s*\|(.+)\|\s*")  # a row of a table
 _NOTHING = re.compile(r"(?:and|und|et|e|y|&)?")
 _SENTENCE = re.compile(r"[.]\s+(?=[A-ZÄÖÜÉÈ])")
-SHARES = ("%", "permille")  # units of a torque over the rated one
+WHOLES = {"%": 100.0, "permille": 1000.0}  # the rated torque, in units of a share of it
 _FEWEST = 3  # columns that a sentence lists: fewer are words
 
 
@@ -144,25 +146,27 @@ def _told(text: str) -> ToldColumn:
         return volts._replace(words="" if _per_volt(phrases[0]) else phrases[0])
     words = phrases[0] if phrases and phrases[0] != unit else ""
     counts = unit_named(unit) == "counts"
-    per_turn = next(
-        (
-            int(one[1])
-            for turns in (_PER_TURN, _ONE_TURN)
-            for one in turns.finditer(text)
-            if unit_named(without_accents(one[2])) == "counts"
-        ),
-        None,
-    )
-    equal, share = (
-        next(filter(None, map(_equal, phrases)), None),
-        named if (named := unit_named(unit)) in SHARES else "",
-    )
+    share = named if (named := unit_named(unit)) in WHOLES else ""
+    equal = next(filter(None, map(_equal, phrases)), None)
+    per_turn = _counts(_PER_TURN, text)
     if equal and not per_turn and (not unit or counts or share):
-        return ToldColumn("" if _equal(phrases[0]) else words, equal[1], equal[0], of=share or "")
+        per_turn = _counts(_ONE_TURN, text) if re.search("motor", text, re.IGNORECASE) else None
+        if not per_turn:
+            of = share if share and equal[2] == WHOLES[share] else ""
+            return ToldColumn("" if _equal(phrases[0]) else words, equal[1], equal[0], of=of)
     if (unit and not counts) or per_turn:
         return ToldColumn(words, unit or "counts", per_turn=per_turn)
     steps = (step for part in phrases if (step := _step(part, counts)))
-    return next((ToldColumn(words, of_step, size) for size, of_step in steps), ToldColumn(words, unit))
+    if found := next((ToldColumn(words, of_step, size) for size, of_step in steps), None):
+        return found
+    per_turn = _counts(_ONE_TURN, text)
+    return ToldColumn(words, unit or ("counts" if per_turn else ""), per_turn=per_turn)
+
+
+def _counts(pattern: re.Pattern[str], text: str) -> int | None:
+    """Counts per turn that a text tells in the words of a pattern; None without."""
+    found = (one for one in pattern.finditer(text) if unit_named(without_accents(one[2])) == "counts")
+    return next((int(one[1]) for one in found), None)
 
 
 def _per_volt(phrase: str) -> ToldColumn | None:
@@ -174,14 +178,17 @@ def _per_volt(phrase: str) -> ToldColumn | None:
     return ToldColumn("", unit, float(match[1].replace(",", ".")), of=match[3])
 
 
-def _equal(phrase: str) -> tuple[float, str] | None:
-    """Size and unit of a count, told by an equation: 1000 = 3.2 Nm, 16384 digits = 16 A; None without one."""
+def _equal(phrase: str) -> tuple[float, str, float] | None:
+    """Size and unit of a count, told by an equation, and its left side where that has no unit: 1000 = 3.2 Nm.
+
+    Or 16384 digits = 16 A; None without one.
+    """
     match = _EQUAL.fullmatch(phrase)
     whole, own, size, unit = match.groups() if match else ("", "", "", "")
     if not (match and _is_unit(unit) and (own in ("", "digit", "digits") or unit_named(own) == "counts")):
         return None
     many, value = float(whole.replace(",", "")), float(size.replace(",", "."))
-    return (value / many, unit) if many and value else None
+    return (value / many, unit, 0.0 if own else many) if many and value else None
 
 
 def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:
@@ -189,9 +196,8 @@ def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:
 
     A whole number of units may be another size, unless the column is in `counts` or it is said of each.
     """
-    match = _SIZE.match(
-        re.sub(rf"^(?:{'|'.join(lexicon().both)}|lsb|(?:1|one) (?:count|digit))\s*=?\s+", "", phrase, flags=re.I)
-    )
+    phrase, of_count = re.subn(r"^lsb\s*=?\s+", "", phrase, flags=re.IGNORECASE)
+    match = _SIZE.match(re.sub(rf"^(?:{'|'.join(lexicon().both)})\s+", "", phrase))
     size, rest = (match[0], match.string[match.end() :].strip()) if match else ("", "")
     share, each = bool(_OF_RATED.fullmatch(rest)), bool(_EACH.fullmatch(rest))
     if unit_named(size) == "permille" and (share or each):
@@ -199,7 +205,7 @@ def _step(phrase: str, counts: bool) -> tuple[float | None, str] | None:
     part = factor_and_unit(size)
     if part is None or not part[0] > 0.0 or unit_named(part[1]) == "counts":
         return None
-    sure = counts or bool(rest) or part[0] <= 1.0
+    sure = counts or bool(of_count) or bool(rest) or part[0] <= 1.0
     return part if (each and sure) or (share and unit_named(part[1]) == "%") else None
 
 

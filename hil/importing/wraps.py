@@ -16,6 +16,7 @@ _AROUND = 5  # rows before and after, which must run against the jump
 _STAYS = 3  # rows after a wrap without another jump: a spike comes back at once
 _SEVERAL, _ALIKE = 3, 0.8  # jumps by one usual range, and their share: a fast motion, beside which they are not sudden
 _FEW_VALUES = 20  # of a switched signal, whose steps are no wraps
+_OWN = 0.1  # of the range: by how much a velocity of this column may miss its way in a row
 _LOST = 0.01  # of the rows: a spike of a velocity loses no angle
 _SAME = 0.1  # of the range: by how much the ranges of several wraps may differ
 _CLOSE = 0.01  # relative deviation from a usual range
@@ -103,14 +104,21 @@ def unwrapped(values: FloatArray, size: float) -> FloatArray:
 def lost_by(
     name: str, size: float, columns: Mapping[str, FloatArray], labels: Mapping[str, Label], period_s: float
 ) -> str:
-    """The measured velocity by which a column goes half of its range or more from row to row; "" without one.
+    """The measured velocity of an unwrapped column by which it goes half of its range or more from row to row.
 
-    Then no way round is the shortest: both in known units.
+    "" without one. Then no way round was the shortest. Both are in known units, and modulo the range the column goes as
+    the velocity tells: that of another shaft does not.
     """
     si, factor = UNITS.get(labels[name].unit or "", ("", 1.0))
     for other, values in columns.items():
         of, per_s = UNITS.get(labels[other].unit or "", ("", 1.0))
-        rows = np.abs(values) * per_s * period_s > 0.5 * size * factor
-        if si and of == f"{si}/s" and not labels[other].command and np.mean(rows[np.isfinite(values)]) > _LOST:
+        if not si or of != f"{si}/s" or labels[other].command:
+            continue
+        turns = 0.5 * (values[1:] + values[:-1]) * per_s * period_s / (size * factor)
+        gone = np.diff(columns[name]) / size
+        fast = np.isfinite(turns) & np.isfinite(gone) & (np.abs(turns) > 0.5)
+        rests = [np.mod(gone[fast] - sign * turns[fast] + 0.5, 1.0) - 0.5 for sign in (1.0, -1.0)]
+        own = any(np.mean(np.abs(rest) < _OWN) > _ALIKE for rest in rests if rest.size)
+        if own and np.count_nonzero(fast) > _LOST * values.size:
             return other
     return ""

@@ -56,8 +56,8 @@ def with_middle_held_out(prepared: Prepared) -> Prepared | None:
         return None
     data = prepared.train.over(parts.train)
     note = (
-        f"{HELD_OUT_NOTE} the middle of each recording is used for validation, since friction or a length goes on "
-        "changing with time, and the end is outside the time of the rest."
+        f"{HELD_OUT_NOTE} the middle of each recording is used for validation, since something goes on changing with "
+        "time, and the end is outside the time of the rest."
     )
     notes = (*(one for one in prepared.notes if not one.startswith(HELD_OUT_NOTE)), note)
     return replace(prepared, train=data, held_out=data.over(parts.middle), notes=notes)

@@ -7,6 +7,7 @@ import numpy as np
 from hil.bench.bench_file import MechanismEntry
 from hil.bench.control_section import delay_in_words
 from hil.diagnosis.sentence import TermErrors, sentence
+from hil.diagnosis.wording import value_in_words
 from hil.identification.coordinates import DELAY
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
@@ -60,8 +61,11 @@ def _before(kept: MechanismEntry, final: Fit, error: float) -> str:
     hypothesis, mechanism = final.hypothesis, BY_ID[kept.effect]
     given = hypothesis.bench.mechanisms[hypothesis.resolved.bench.mechanisms.index(kept)].active()
     before, after = (entry.values[mechanism.strength] for entry in (given, kept.active()))
-    unit = unit_of(mechanism.parameters[mechanism.strength].name)
-    return f" It is {quantity(before, unit)} in the bench file." if abs(after - before) > SIGMAS * error > 0.0 else ""
+    if not abs(after - before) > SIGMAS * error > 0.0:
+        return ""
+    text = mechanism.variants[kept.active().variant].text or mechanism.text
+    told = -before if after < 0.0 and text.reversed else before  # as the sentence counts it
+    return f" The bench file has {value_in_words(told, mechanism.parameters[mechanism.strength], final.bench)}."
 
 
 def matters(fit: Fit, entry: MechanismEntry, data: Dataset) -> bool:

@@ -46,3 +46,21 @@ def test_an_angle_of_half_a_turn_from_row_to_row_is_no_position(tmp_path: Path) 
     assert {"column": "n[rpm]", "unit": "rpm"} in channels.values()
     assert "sign" not in channels["torque_n_m"]
     assert draft.left_out["angle[deg]"] == "n[rpm] goes half of its range and more from row to row"
+
+
+@pytest.mark.parametrize("ratio", [50.0, 1.7])
+def test_a_speed_of_another_shaft_loses_no_angle(ratio: float, tmp_path: Path) -> None:
+    t = 0.01 * np.arange(1800)
+    rpm = np.interp(t, [1.0, 4.0, 8.0, 14.0, 17.0], [0.0, 60.0, 60.0, -60.0, 0.0])
+    angle = np.mod(np.cumsum(6.0 * rpm) * 0.01, 360.0)
+    of_motor = ratio * 60.0 * rpm if ratio < 2.0 else ratio * 1.3 * rpm
+    torque = 0.2 * np.sign(rpm) + 1e-3 * rpm + 2e-3 * np.gradient(rpm, t)
+    torque += np.random.default_rng(1).normal(0.0, 0.01, t.size)
+    columns = {
+        "t[s]": t,
+        "n_mot[rpm]": np.round(of_motor, 1),
+        "angle[deg]": np.round(angle, 2),
+        "M[Nm]": np.round(torque, 3),
+    }
+    draft = draft_map(write(tmp_path / "run.csv", columns))
+    assert "angle[deg]" not in draft.left_out

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from foreign_axis import axis, write
 
 from hil.commands.import_ import import_
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
 from hil.importing.lexicon import Quantity
+from hil.importing.map_text import map_text
 from hil.importing.readme_columns import told_columns
 from hil.recording.recording import read_recording
 
@@ -64,7 +66,41 @@ def test_counts_of_a_turn_may_be_a_power_or_an_equation(told: str, tmp_path: Pat
 @pytest.mark.parametrize("name", ["scale_nm", "pos_nm"])
 def test_a_linear_scale_in_nm_is_in_nanometres(name: str) -> None:
     assert (label(name).quantity, label(name).unit) == (Quantity.POSITION, "nm")
-    assert label("load_nm").unit == "N m"
+
+
+@pytest.mark.parametrize("name", ["load_nm", "motor_scaled_Nm", "full_scale_Nm", "M_scaled [Nm]", "tape_load_Nm"])
+def test_a_torque_is_in_newton_metres(name: str) -> None:
+    assert (label(name).quantity, label(name).unit) == (Quantity.EFFORT, "N m")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("speed, 10 counts = 1 rev/min", ("rev/min", 0.1, None)),
+        ("angle, 4096 Inc = 1 rev", ("rev", 1 / 4096, None)),
+        ("table position, 0.0001 mm (100000 counts = 1 rev = 10 mm)", ("mm", 0.0001, None)),
+        ("motor encoder, counts, 0.2 um each, 50000 counts = 1 turn", ("um", 0.2, None)),
+        ("motor encoder, 65536 Inc = 1 electrical turn (4 pole pairs)", ("", None, None)),
+        ("motor encoder, 524288 Inc = 1 rev (+ = +X)", ("counts", None, 524288)),
+        ("Lage in Inc, 10000 Inc = 1 Motorumdrehung = 4 mm", ("Inc", None, 10000)),
+    ],
+)
+def test_what_an_equation_tells(text: str, expected: tuple[str, float | None, int | None]) -> None:
+    told = told_columns([f"- pos_x: {text}", "- trq_x: torque, Nm"], ["pos_x", "trq_x"]).get("pos_x")
+    found = ("", None, None) if told is None else (told.unit, told.step, told.per_turn)
+    assert found == (expected[0], pytest.approx(expected[1]) if expected[1] else None, expected[2])
+
+
+@pytest.mark.parametrize(
+    "of", ["torque in percent of rated torque (1000 = 3.2 Nm)", "torque in percent, 16384 digits = 16 A"]
+)
+def test_an_equation_of_other_numbers_is_not_applied_to_a_share(of: str, tmp_path: Path) -> None:
+    columns = {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "trq_%": np.round(AXIS["torque"] / 0.032, 2)}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(f"- pos_rad: rad\n- trq_%: {of}\n")
+    channels = yaml.safe_load(map_text(draft_map(path, readme=tmp_path / "README.md")))["channels"]
+    assert channels["torque_n_m"]["unit"] == "%"
+    assert "scale" not in channels["torque_n_m"]
 
 
 @pytest.mark.parametrize("whole", ["largest current 40 A (= 100 % TRQ)", "100 % = 40 A"])

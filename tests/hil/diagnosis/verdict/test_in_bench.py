@@ -32,7 +32,7 @@ def test_a_load_is_told_if_it_is_more_than_the_torque_left(load_n_m: float, told
     assert "such as a weight" not in said
 
 
-@pytest.mark.parametrize(("file_n_m", "told"), [(0.3, " It is 0.300 N m in the bench file."), (0.5, "")])
+@pytest.mark.parametrize(("file_n_m", "told"), [(0.3, " The bench file has 0.300 N m."), (0.5, "")])
 def test_a_load_that_departs_from_the_bench_file_is_told_with_both_values(file_n_m: float, told: str) -> None:
     owner = with_load(file_n_m)
     data = dataset([take(recorded(bench(), Term("constant_load", 0, (0.5,))), owner)], owner)

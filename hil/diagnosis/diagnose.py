@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from hil.bench.bench_file import Bench
 from hil.diagnosis.diagnosis import Diagnosis
-from hil.diagnosis.preparation.middle_held_out import goes_on, names_more, with_middle_held_out
 from hil.diagnosis.preparation.prepare import prepare
 from hil.diagnosis.preparation.structure import as_one_inertia, as_plant_alone, without_open_delay
 from hil.diagnosis.reporting import report
@@ -14,6 +13,7 @@ from hil.diagnosis.stages import Judged, Prepared, Progress
 from hil.diagnosis.time_left import usual_budget_s, with_time_left
 from hil.diagnosis.verdict.inside_time import test_inside_time
 from hil.diagnosis.verdict.judge import judge
+from hil.diagnosis.verdict.middle_held_out import goes_on, names_more, with_middle_held_out
 from hil.diagnosis.verdict.reproduction import behind_plain, with_less_torque
 from hil.errors import InputError
 from hil.identification.parallel import one_blas_thread

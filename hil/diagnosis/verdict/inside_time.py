@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from hil.diagnosis.preparation.middle_held_out import with_middle_held_out
 from hil.diagnosis.search.refits import carried, over
 from hil.diagnosis.stages import Searched, Tested
 from hil.diagnosis.verdict.held_out import test_on_held_out
+from hil.diagnosis.verdict.middle_held_out import with_middle_held_out
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
 from hil.identification.noise_apart import noise_apart

@@ -40,6 +40,7 @@ def believing(effect: str, **values: float) -> Bench:
     return bench_of_effects(mechanisms=[*entries, {"effect": effect, "parameters": EFFECTS[effect] | values}])
 
 
+@pytest.mark.long
 def test_what_was_found_helps_as_predicted_and_is_kept(tmp_path: Path) -> None:
     trial = tried(tmp_path, diagnosed())
     (motion,) = trial.motions

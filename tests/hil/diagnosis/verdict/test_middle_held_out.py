@@ -12,8 +12,8 @@ from foreign_axis import write
 from scipy.signal import lfilter
 
 from hil.commands.import_ import import_
-from hil.diagnosis.preparation.middle_held_out import with_middle_held_out
 from hil.diagnosis.preparation.prepare import prepare
+from hil.diagnosis.verdict.middle_held_out import with_middle_held_out
 from hil.drafting.drafted_bench import drafted
 from hil.explanation import explain
 from hil.identification.measured import Measured

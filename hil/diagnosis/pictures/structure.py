@@ -65,8 +65,8 @@ def _means(axis: Axes, one: Dependence, drive_unit: str) -> None:
     what = "needed beyond the twin" if one.channel == TORQUE else "second encoder - twin"
     if change := one.question.change:
         what = f"{coefficient(change, drive_unit)[0]} beyond the twin's"
-    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {one.question.name.partition(' (')[0]}"
     over = "time" if one.question.change else one.question.name
+    title = f"{100.0 * one.explained:.0f} % of the residual depends on the {over.partition(' (')[0]}"
     style_axis(axis, f"{what}\n[{unit}]", f"{over} [{along_unit}]", title)
     if turn:
         axis.legend(frameon=False)

@@ -188,7 +188,7 @@ def _strongest(result: Result) -> list[str]:
 
 
 def _depends(result: Result) -> str:
-    """What is left depends on, and what maps of it leave; empty without a structure."""
+    """Sentences on the structure that is left, and on how much of it maps leave; empty without a structure."""
     told = _strongest(result)
     maps = "".join(
         f" On held-out motion a map of the {one.effect.removeprefix('unnamed_').replace('_', ' ')} leaves "

@@ -104,10 +104,10 @@ def unwrapped(values: FloatArray, size: float) -> FloatArray:
 def lost_by(
     name: str, size: float, columns: Mapping[str, FloatArray], labels: Mapping[str, Label], period_s: float
 ) -> str:
-    """The measured velocity of an unwrapped column by which it goes half of its range or more from row to row.
+    """The measured velocity by which a column moves half of its range or more from row to row; "" without one.
 
-    "" without one. Then no way round was the shortest. Both are in known units, and modulo the range the column goes as
-    the velocity tells: that of another shaft does not.
+    Such a column cannot be unwrapped: the shortest way round is not its way. The velocity is its own if both, in known
+    units, agree modulo the range; that of another shaft does not.
     """
     si, factor = UNITS.get(labels[name].unit or "", ("", 1.0))
     for other, values in columns.items():

@@ -15,7 +15,7 @@ import numpy as np
 from hil.importing.lexicon import Constant, ConstantWords, lexicon, without_accents
 from hil.importing.nominal_values import mass_told
 from hil.importing.units import unit_named
-from hil.importing.values_behind import Statement, told_behind
+from hil.importing.values_behind import Statement, size_of_count, told_behind
 from hil.quantities import UNITS
 
 
@@ -106,6 +106,7 @@ def _statements(line: str) -> Iterator[Statement]:
         yield from (Statement(f"rated {of}", size, units, header_text(line)) for of in ("torque", "force", "current"))
         if whole["size"]:  # the rest of the line says of which
             return
+    yield from filter(None, [size_of_count(folded, header_text(line))])
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
         before = folded[matches[index - 1].end() if index else 0 : match.start()]
@@ -117,7 +118,7 @@ def _statements(line: str) -> Iterator[Statement]:
         if restated or (_EQUALS.fullmatch(behind) and before.endswith("(")):  # (1000 = 3.2 Nm)
             continue
         if not _THOUSANDS.fullmatch(match[0]):
-            yield from told_behind(before, value, behind, header_text(line))
+            yield from told_behind(folded[: match.start()], before, value, behind, header_text(line))
         if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
             yield lead
         if re.search(r"[^\W\d]", before):
@@ -217,8 +218,7 @@ def _says_all(known: ConstantWords, words: str) -> bool:
 
     A percentage of a rated value says not of which.
     """
-    match = re.search(_pattern(known), words)
-    found = match[1].replace(" ", "") if match else ""
+    found = match[1].replace(" ", "") if (match := re.search(_pattern(known), words)) else ""
     return (len(found) > _SYMBOL and not found.startswith("percent")) or (
         found in lexicon().scalars.constant and found != "km"
     )

@@ -55,14 +55,15 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     titles = {table.titles.get(name, name): name for name in table.columns}
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
+    told = _by_number(lines, list(table.columns)) | told
     if parts := _last_parts(titles):
         told = {parts[part]: one for part, one in told_columns(lines, list(parts)).items()} | told
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
     if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
         told = {name: _as_angle(table, name, one) if name != motor else one for name, one in told.items()}
-    firm = {name: one.unit for name, one in told.items() if (one.per_turn or one.of) and one.step}
-    units = {name: unit for name, unit in table.units.items() if name not in told or unit_named(unit)}
+    firm = {name: one.unit for name, one in told.items() if one.step and _is_firm(table, name, one)}
+    units = {n: unit for n, unit in table.units.items() if n not in firm and (n not in told or unit_named(unit))}
     steps = {name: one.step for name, one in told.items() if one.step and (name in firm or name not in units)}
     return replace(
         table,
@@ -72,6 +73,13 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
         words={name: one.words for name, one in told.items() if one.words} | table.words,
         constants=constants | table.constants,
     )
+
+
+def _by_number(lines: list[str], columns: list[str]) -> dict[str, ToldColumn]:
+    """What a list that numbers all columns says of each, by its name."""
+    names = {f"column {number}": name for number, name in enumerate(columns, 1)}
+    told = told_columns(lines, list(names)) if columns[0] not in names else {}
+    return {names[number]: one for number, one in told.items()} if len(told) == len(columns) else {}
 
 
 def _last_parts(titles: Mapping[str, str]) -> dict[str, str]:
@@ -101,6 +109,16 @@ def _as_angle(table: ForeignTable, name: str, told: ToldColumn) -> ToldColumn:
     return told._replace(unit="deg", step=360.0 / told.per_turn)
 
 
+def _is_firm(table: ForeignTable, name: str, told: ToldColumn) -> bool:
+    """True if the size of a count goes before the unit of the column's name: that is counts, or what is told of it."""
+    return bool(told.per_turn or told.of) or _own_unit(table, name) == "counts"
+
+
+def _own_unit(table: ForeignTable, name: str) -> str | None:
+    """Unit that a file gives a column beside it, or in its name."""
+    return unit_named(table.units.get(name, "")) or label(table.titles.get(name, name)).unit
+
+
 def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
     """True if a column may be what a README tells: of the quantity of its words, and whole numbers of its counts."""
     said = label(table.titles.get(name, name), "", told.words).quantity
@@ -110,6 +128,6 @@ def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
     if told.step is None:
         return True
     if told.of:
-        named = unit_named(table.units.get(name, "")) or label(table.titles.get(name, name)).unit
+        named = _own_unit(table, name)
         return named == told.of or (told.of in WHOLES and named is None)
     return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

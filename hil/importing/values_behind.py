@@ -1,4 +1,7 @@
-"""Constants whose words stand behind their number: 8192 per motor turn, 250 samples per second, 5 ms per line."""
+"""Constants whose words stand behind their number: 8192 per motor turn, 250 samples per second, 5 ms per line.
+
+And those of a sentence or a phrase of their own: logged at 4 kHz; leg 3   500 Hz; 1 count = 0.05 um.
+"""
 
 import re
 from collections.abc import Iterator
@@ -12,6 +15,21 @@ _OF_COUNTS = re.compile(r"encoder|resolver|increment|inkrement|geber|codeur")
 _NO_COUNTS = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho|quadratur\w*|x ?4)\b")
 _PER_SECOND = re.compile(r"^ *(samples|rows|lines) ?(?:per|/) ?s(?:ec|\b)")
 _PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) (?:per (?:line|row)|apart)\b")
+_LOGGED_AT = re.compile(
+    r"\b(?:logged|recorded|sampled|captured|traced|aufgezeichnet|abgetastet|aufgenommen|enregistre\w*)\b[^.;,]* "
+    r"(?:at|with|mit|a)(?: about)? *$"
+)
+_HERTZ = re.compile(r"^ *(k?hz)\b")
+_ALONE = re.compile(r"^ *(k?hz) *(?:$|[,;)|\t]|  )")  # between separators: leg 3   500 Hz; two lines, 500 Hz, 48 s
+_BEGINS = re.compile(r"(?:^|  |\t|[(|]|[^\W\d][^,;]*[,;]) *$")
+_OTHER_HERTZ = re.compile(
+    r"\b(\w*loops?|\w*kreis|bandwi?d?th|bandbreite|filter\w*|\w*pass|cut\w*|corner|pwm|switching|carrier|modes?|sines?"
+    r"|resonan\w*|eigen\w*|chirp|sweep|multi\w*|noise|rauschen|regler|control\w*|drive|umrichter|bus|internal\w*)\b"
+)
+_COUNT_IS = re.compile(
+    r"\b1 ?(?:count|cnt|inc|increment|inkrement|digit|tick|lsb) ?(?:=|is|are|equals|entspricht) ?"
+    r"(\d+(?:[.,]\d+)?(?:e-?\d+)?) ?([nu]?m|mm)\b"
+)
 _OF_FILE = re.compile(
     r"\b(file|rows?|sample (?:number|index|counter)|record\w*|header|separated|comma|tabs?)\b|\.\w{2,5}\b"
 )
@@ -36,8 +54,23 @@ class Statement:
     weak: bool = False
 
 
-def told_behind(before: str, value: float, text: str, line: str) -> Iterator[Statement]:
-    """The statement of a number behind which its words stand, of counts per turn, a rate or a period."""
+def size_of_count(text: str, line: str) -> Statement | None:
+    """The statement of a length of one count: 1 count = 0.05 um."""
+    told = _COUNT_IS.search(text)
+    size = float(told[1].replace(",", ".")) if told else 0.0
+    return Statement("", 1.0 / size, (f"counts/{told[2]}",), line) if told and size else None
+
+
+def told_behind(ahead: str, before: str, value: float, text: str, line: str) -> Iterator[Statement]:
+    """The statement of a number behind which its words stand, of counts per turn, a rate or a period.
+
+    `before` are the words since the last number, `ahead` all of the line before this one.
+    """
+    alone = _ALONE.match(text) if _BEGINS.search(before) and not _OTHER_HERTZ.search(ahead) else None
+    of_file = _OF_FILE.search(ahead) or re.search(r"(?:^|  |\t) *$", before)
+    hertz = _HERTZ.match(text) if _LOGGED_AT.search(before) else alone if of_file else None
+    if hertz:
+        yield Statement("sample rate", value, (hertz[1],), line, weak=True)
     text = re.split(r"[.;](?:\s|$)", text)[0]
     turn = _PER_TURN.match(text)
     if turn and _OF_COUNTS.search(before) and not _NO_COUNTS.search(before + text):

@@ -50,6 +50,18 @@ def test_a_share_of_the_rated_torque_is_told_by_an_equation(tmp_path: Path) -> N
     np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
 
 
+@pytest.mark.parametrize("told", ["- pos_cnt: linear scale, 0.1 um per count\n- i: A\n", "1. scale, 0.1 um\n2. A\n"])
+def test_the_size_of_a_count_goes_before_the_word_counts_in_a_name(told: str, tmp_path: Path) -> None:
+    """A list with a number for each column tells it, too."""
+    pos_m = 0.001 * AXIS["angle"]
+    path = write(tmp_path / "log.csv", {"pos_cnt": np.round(pos_m * 1e7), "i": AXIS["torque"]})
+    (tmp_path / "README.md").write_text(f"Linear motor, 2 N/A, logged at {1.0 / AXIS['t'][1]:g} Hz.\n\n{told}")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(found["motor_position_m"], pos_m, atol=1e-7)
+    assert found.period_s == pytest.approx(AXIS["t"][1])
+
+
 @pytest.mark.parametrize(
     "told",
     ["2^21 counts per rev", "2**21 Inc = 1 rev", "2097152 counts = 1 turn", "2097152 Inc = 1 Motorumdrehung = 4 mm"],

@@ -15,7 +15,7 @@ from hil.quantities import digits
 
 _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
 UNKNOWN = "unknown"
-MOST_TORQUE_DELAY_S = 0.2  # either way
+MOST_TORQUE_DELAY_S = 0.5  # either way: a row and a half of 300 ms
 
 # a period in milliseconds is refused
 Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="period of the loop [s]")]

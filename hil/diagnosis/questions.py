@@ -21,7 +21,7 @@ from hil.quantities import digits, quantity
 
 _ROWS = 4.0  # per period of a line: less is an alias
 _MOST_PERIODS = 4000  # of a line over the travel
-_SEEN = 4.0  # bins of the position per period, from which they show it
+_LONGEST = 0.5  # period of a line over the travel: seen twice
 POSITION, SPEED, OFFSET = "position", "speed", "offset"
 # Of the recorded torque, a coefficient that may change as those of the plain model; and of the second encoder.
 LATENESS, ENCODER_LATENESS = "lateness", "encoder lateness"
@@ -168,7 +168,7 @@ def strongest_line(
 ) -> tuple[float, int] | None:
     """Period of the strongest line of a residual over the position, and of how many; None without one.
 
-    Periods are shorter than the bins of the position show, and longer than counts and rows make.
+    Periods are longer than counts and rows make, and seen twice.
     """
     position, speed = (
         np.concatenate([one[part.rows] for one, part in zip(question.values, parts, strict=True)])
@@ -181,7 +181,7 @@ def strongest_line(
     counts = np.sqrt(12.0) * max(ratio * run.noise.motor, run.noise.table_m)
     shortest = max(_ROWS * run.period_s * float(np.median(np.abs(speed))), _ROWS * float(counts), span / _MOST_PERIODS)
     left = np.concatenate([part.left[part.rows] for part in parts])
-    longest = _SEEN * span / BINS
+    longest = _LONGEST * span
     found = strongest_periods(position, left, shortest / _ROWS, shortest, 1, longest)
     choices = int(2.0 * span / shortest)
     return (refined_period(position, left, found[0], shortest, longest), choices) if found else None

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hil.identification.estimator import Fit
     from hil.identification.honest_refit import Refit
     from hil.identification.terms import Key, Term
+    from hil.twin.axis import Steps
 
 Progress = Callable[[str], None]
 
@@ -45,6 +46,11 @@ class Prepared:
     bench_file: Bench
     law: LawCheck
     notes: tuple[str, ...] = ()
+
+    def with_steps(self, steps: Steps) -> Prepared:
+        """The same with other internal steps of the twin."""
+        train, held_out = (replace(data, steps=steps) for data in (self.train, self.held_out))
+        return replace(self, train=train, held_out=held_out)
 
 
 @dataclass(frozen=True, eq=False)

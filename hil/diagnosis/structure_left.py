@@ -209,7 +209,7 @@ def left_in_channel(
     return [
         ResidualSeries(left["table"], measured_motion(run).sliding(plain.slowest))
         for run in data.runs
-        for left in [residuals(run, data.observer_s, fast)]
+        for left in [residuals(run, data.observer_s, data.steps_of(fast))]
     ]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hil.bench.axis_fields import RATIOS
 from hil.bench.bench_file import MechanismEntry
+from hil.bench.control_section import MOST_TORQUE_DELAY_S
 from hil.identification.derivatives import SMOOTH_S
 from hil.twin.library import BY_ID
 from hil.twin.parameter import Parameter, Role
@@ -105,7 +106,8 @@ def axis_coordinate(name: str, value: float, inertia: float) -> Coordinate:
 def delay_coordinate(delay_s: float, period_s: float) -> Coordinate:
     """The coordinate of the delay of a recorded torque."""
     most_s = MOST_DELAY * period_s + 0.5 * SMOOTH_S
-    return Coordinate(DELAY, period_s, False, delay_s - most_s, delay_s + most_s, least_step=1e-3)
+    low, high = max(delay_s - most_s, -MOST_TORQUE_DELAY_S), min(delay_s + most_s, MOST_TORQUE_DELAY_S)
+    return Coordinate(DELAY, period_s, False, low, high, least_step=1e-3)
 
 
 def coordinate_of(name: str, parameter: Parameter, start: float) -> Coordinate:

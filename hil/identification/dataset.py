@@ -18,12 +18,17 @@ from hil.identification.measured import Measured
 from hil.identification.observability import Observability, common
 from hil.identification.residual_scales import DISCREPANCY, TORQUE_ACCURACY, inertia, scales
 from hil.identification.whitening import filtered
+from hil.twin.axis import TWIN_STEPS, Steps
 from hil.twin.stepping.loops import LEAST_TICKS
 
 # Bounds of the time constant of the motor's observer. Fast: stick-slip decays within a few ticks, so that even a poor
 # start converges; below two ticks the sampled observer is unstable on an elastic axis. Slow: a coarse encoder still
 # resolves the torque.
 FASTEST_OBSERVER_TICKS, FASTEST_OBSERVER_S, SLOWEST_OBSERVER_S = LEAST_TICKS, 0.002, 0.008
+
+# Internal steps of a search: block by block, residuals differ from those at the twin's own by less than 0.25 of the
+# noise (rms) for every mechanism but a chattering nut, in a half to a fifth of the time.
+SEARCH_STEPS = Steps(100e-6, 500e-6)
 
 
 class NoiseApart(NamedTuple):
@@ -62,14 +67,16 @@ class Dataset:
     """Recordings of one axis prepared for a fit, with everything that does not depend on the hypothesis.
 
     `observer_s` is the time constant of the motor's observer in the block residuals, `travel_m` the largest range of
-    the position set-points. What nothing explains of a channel counts as noise if the channel is in `set_aside`, with
-    the factor on its noise. `apart`: the noise of each run, if it is kept apart (`hil.identification.noise_apart`).
+    the position set-points, `steps` are the internal ones of the twin. What nothing explains of a channel counts as
+    noise if the channel is in `set_aside`, with the factor on its noise. `apart`: the noise of each run, if it is kept
+    apart (`hil.identification.noise_apart`).
     """
 
     runs: tuple[Measured, ...]
     bench: Bench
     observer_s: float = FASTEST_OBSERVER_S
     travel_m: float = 0.1
+    steps: Steps = TWIN_STEPS
     set_aside: Mapping[str, float] = field(default_factory=dict)
     apart: tuple[NoiseApart, ...] = ()
     _scales: dict[tuple[float, float], tuple[dict[str, FloatArray], ...]] = field(
@@ -88,6 +95,10 @@ class Dataset:
     def louder(self, factors: Mapping[str, float]) -> "Dataset":
         """The same recordings with channels set aside, each with the factor on its noise."""
         return replace(self, set_aside=factors)
+
+    def steps_of(self, fast: bool) -> Steps:
+        """Internal steps of the twin; `fast`: those of a search, if they are longer."""
+        return Steps(*map(max, self.steps, SEARCH_STEPS)) if fast else self.steps
 
     @property
     def duration_s(self) -> float:

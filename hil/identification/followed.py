@@ -23,7 +23,7 @@ from hil.identification.measured import Measured
 from hil.identification.residual_scales import follows
 from hil.identification.residuals import differences
 from hil.identification.standstill import resting
-from hil.twin.axis import Response, Twin, taken_back
+from hil.twin.axis import Response, Steps, Twin, taken_back
 from hil.twin.mechanism import Moment, Stage
 from hil.twin.physics import Active
 from hil.twin.structure.chain import Chain
@@ -41,15 +41,15 @@ _MOST_DAMPED = 0.99  # ratio of a mode that the twin can integrate
 
 
 def behind_motor(
-    hypothesis: "Hypothesis", run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
+    hypothesis: "Hypothesis", run: Measured, observer_s: float, steps: Steps, rests: Measured | None = None
 ) -> dict[str, FloatArray]:
     """Residual (n,) of a second encoder that is judged behind the measured motor; empty without one.
 
-    `fast`: with the internal steps of a search. The motor rests where it does in `rests`, by default in the run.
+    The motor rests where it does in `rests`, by default in the run.
     """
     if not follows(run, bool(hypothesis.bench.axis.SPRINGS), observer_s):
         return {}
-    twin = hypothesis.twin(observer_s, fast, run)
+    twin = hypothesis.twin(observer_s, steps, run)
     measured, rest = hypothesis.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
     chain = _with_heavy_motor(twin.physics.chain)
     active = tuple(one for one in twin.active if not _by_torque(one))
@@ -92,7 +92,7 @@ def _moved(heavy: Twin, path: _Path, run: Measured, rest: NDArray[np.bool_]) -> 
         gains=heavy.gains._replace(period_s=path.period_s),
         observer_s=heavy.observer_s / parts,
         push_n=np.repeat(heavy.push_n, parts),
-        coarse_step_s=min(parts, _LONGER) * heavy.coarse_step_s,
+        steps=heavy.steps._replace(coarse_s=min(parts, _LONGER) * heavy.steps.coarse_s),
     )
     moved = finer.observe(
         np.repeat(run.position_command_m, parts),
@@ -115,12 +115,12 @@ def _by_torque(active: Active) -> bool:
     return bool(without != other)
 
 
-def second_encoder(hypothesis: "Hypothesis", run: Measured, observer_s: float, fast: bool) -> dict[str, FloatArray]:
+def second_encoder(hypothesis: "Hypothesis", run: Measured, observer_s: float, steps: Steps) -> dict[str, FloatArray]:
     """Residual (n,) of the second encoder of an axis with springs, by the motion that was measured; else empty."""
     if not (hypothesis.bench.axis.SPRINGS and run.table_m.size):
         return {}
-    behind = behind_motor(hypothesis, run, observer_s, fast)
-    return behind or {"table": hypothesis.driven(run, observer_s, fast)["table"]}
+    behind = behind_motor(hypothesis, run, observer_s, steps)
+    return behind or {"table": hypothesis.driven(run, observer_s, steps)["table"]}
 
 
 def _with_heavy_motor(chain: Chain) -> Chain:

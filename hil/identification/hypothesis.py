@@ -33,16 +33,11 @@ from hil.identification.residual_scales import inertia
 from hil.identification.residuals import Residuals, differences
 from hil.identification.standstill import resting
 from hil.identification.terms import Term, push_n, repeats
-from hil.twin.axis import COARSE_STEP_S, FINE_STEP_S, Response, Twin, taken_back
+from hil.twin.axis import TWIN_STEPS, Response, Steps, Twin, taken_back
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Contact
 from hil.twin.mechanisms.channel_time_skew import delayed
 from hil.twin.physics import Active
-
-# Longest internal steps of the twin in a search, fine and coarse: block by block, residuals differ from those at the
-# twin's own steps by less than 0.25 of the noise (rms) for every mechanism but a chattering nut, in a half to a fifth
-# of the time.
-SEARCH_STEPS_S = (100e-6, 500e-6)
 
 
 class Resolved(NamedTuple):
@@ -225,17 +220,15 @@ class Hypothesis:
                 taken.append(entry.effect)
         return tuple(kept)
 
-    def twin(self, observer_s: float = FASTEST_OBSERVER_S, fast: bool = False, run: Measured | None = None) -> Twin:
-        """The twin, with the time constant of its observer and the events of a run.
-
-        `fast`: with the internal steps of a search.
-        """
+    def twin(
+        self, observer_s: float = FASTEST_OBSERVER_S, steps: Steps = TWIN_STEPS, run: Measured | None = None
+    ) -> Twin:
+        """The twin, with the time constant of its observer, its internal steps and the events of a run."""
         bench, terms = self.resolved
         active = tuple(entry.active() for entry in self.kept)
         added = tuple(Active(term.effect, term.values, term.variant) for term in terms if not term.windows)
-        fine_s, coarse_s = SEARCH_STEPS_S if fast else (FINE_STEP_S, COARSE_STEP_S)
         push = np.empty(0) if run is None else push_n(terms, run.name, run.time_s, run.period_s)
-        return Twin(bench.axis.physics(), bench.gains, active + added, None, coarse_s, fine_s, observer_s, push)
+        return Twin(bench.axis.physics(), bench.gains, active + added, None, steps, observer_s, push)
 
     def respond(self, run: Measured) -> Response:
         """Response of the twin in closed loop to the set-points of a run. Raises FieldError without a control law."""
@@ -249,16 +242,16 @@ class Hypothesis:
         return _undelayed(run, twin.late, (self.resolved.bench.torque_delay_s or 0.0) / run.period_s)
 
     def blocks(
-        self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
+        self, run: Measured, observer_s: float, steps: Steps = TWIN_STEPS, rests: Measured | None = None
     ) -> dict[str, FloatArray]:
         """Measured less twin, blocks fed measured inputs, per channel (n,); 0: hidden. At rest where `rests` is."""
-        return self.driven(run, observer_s, fast, rests) | behind_motor(self, run, observer_s, fast, rests)
+        return self.driven(run, observer_s, steps, rests) | behind_motor(self, run, observer_s, steps, rests)
 
     def driven(
-        self, run: Measured, observer_s: float, fast: bool = False, rests: Measured | None = None
+        self, run: Measured, observer_s: float, steps: Steps = TWIN_STEPS, rests: Measured | None = None
     ) -> dict[str, FloatArray]:
         """The same where the measured torque drives the axis in each block."""
-        twin = self.twin(observer_s, fast, run)
+        twin = self.twin(observer_s, steps, run)
         measured, rest = self.undelayed(twin, run), resting(rests or run, twin.slow_velocity)
         predicted = twin.observe(
             run.position_command_m, run.velocity_command_m_s, measured, run.start, rest, run.feedforward
@@ -271,19 +264,19 @@ class Hypothesis:
         """Residuals on a data set, block by block or in closed loop; `fast`: with the steps of a search."""
         key = (data, closed, fast)
         if key not in self._done:
-            runs, bench = data.runs, self.bench
+            runs, bench, steps = data.runs, self.bench, data.steps_of(fast)
             if closed:
                 channels = [differences(run.response, self.respond(run), bench, run.evaluated) for run in runs]
             elif data.apart:
                 own = inertia(self.resolved.bench)
                 channels = [
                     {name: one.of(name, values, own) for name, values in free.items()}
-                    | second_encoder(self, run, data.observer_s, fast)
+                    | second_encoder(self, run, data.observer_s, steps)
                     for one, run in zip(data.apart, runs, strict=True)
-                    for free in [self.driven(one.smooth, data.observer_s, fast, rests=run)]
+                    for free in [self.driven(one.smooth, data.observer_s, steps, rests=run)]
                 ]
             else:
-                channels = [self.blocks(run, data.observer_s, fast) for run in runs]
+                channels = [self.blocks(run, data.observer_s, steps) for run in runs]
             self._done[key] = Residuals(data, tuple(channels))
         return self._done[key]
 

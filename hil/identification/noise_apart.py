@@ -55,14 +55,15 @@ def _apart(data: Dataset, run: Measured, reference: Hypothesis, plain: PlainMode
     taps, gain, window = np.ones(1), 1.0, 0
     needed = np.where(rows, plain.predict(moved), run.torque) if springs else plain.predict(moved)
     smooth = _driven(replace(run, motor=moved.position), needed)
-    measured, free = (reference.driven(one, data.observer_s, rests=run) for one in (run, smooth))
+    measured, free = (reference.driven(one, data.observer_s, data.steps, run) for one in (run, smooth))
     noise, of_reference = {name: measured[name] - free[name] for name in measured}, inertia(reference.resolved.bench)
     if rows.any():
         of_model, a = plain.predict(moved if fine else own.moved), run.period_s / data.observer_s
         taps, left = _whitened(np.where(rows, run.torque - of_model, 0.0), moved, rows, plain, a)
         if springs:
             noise["motor"] = (
-                reference.driven(_driven(smooth, needed + left), data.observer_s, rests=run)["motor"] - free["motor"]
+                reference.driven(_driven(smooth, needed + left), data.observer_s, data.steps, run)["motor"]
+                - free["motor"]
             )
         else:
             window, beyond = own.window, observed(np.where(rows, own.torque - of_model, 0.0), a)

@@ -134,29 +134,29 @@ def noise_ratios(hypothesis: Hypothesis, data: Dataset) -> tuple[dict[str, float
             of_runs.append(ratios)
             continue
         if ratios.get("table", 0.0) > 1.0:
-            added = _amplified_by_transmission(hypothesis, run, channels["table"], data.observer_s)
+            added = _amplified_by_transmission(hypothesis, run, channels["table"], data)
             ratios["table"] /= max(1.0, 1.0 + added / run.noise.table_m**2)
         if ratios["motor"] > 1.0 and "table" in ratios:
             scale, part = data.scales()[index]["motor"][run.evaluated], residuals.parts[index, "motor"]
-            noise = 1.0 + _returned_to_motor(hypothesis, run, channels, data.observer_s, scale)
+            noise = 1.0 + _returned_to_motor(hypothesis, run, channels, data, scale)
             ratios["motor"] = float(np.mean(part**2 / noise))
         of_runs.append(ratios)
     return tuple(of_runs)
 
 
-def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: FloatArray, observer_s: float) -> float:
+def _amplified_by_transmission(hypothesis: Hypothesis, run: Measured, table: FloatArray, data: Dataset) -> float:
     """Variance [m^2] that noise of the motor encoder adds to the block residual `table` (n,) beyond its direct part.
 
     The input of the table block is the measured motion of the motor: a lightly damped resonance amplifies its noise.
     """
     noise = run.motor_noise * np.random.default_rng(0).standard_normal(run.motor.size)
-    noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), observer_s, rests=run)["table"]
+    noisy = hypothesis.blocks(replace(run, motor=run.motor + noise), data.observer_s, data.steps, run)["table"]
     added = float(np.var((noisy - table)[run.evaluated]))
     return added - float(np.mean((hypothesis.bench.axis.ratio_m_rad * run.motor_noise[run.evaluated]) ** 2))
 
 
 def _returned_to_motor(
-    hypothesis: Hypothesis, run: Measured, channels: dict[str, FloatArray], observer_s: float, scale: FloatArray
+    hypothesis: Hypothesis, run: Measured, channels: dict[str, FloatArray], data: Dataset, scale: FloatArray
 ) -> FloatArray:
     """Mean square (n,) that counts of the table add to the block residual of the motor, in units of `scale` (n,).
 
@@ -171,12 +171,12 @@ def _returned_to_motor(
     if not np.isfinite(place).all():
         return added
     count = min(table.resolution_m if table else 0.0, np.sqrt(12.0) * run.noise.table_m)
-    quiet = hypothesis.blocks(replace(run, table_m=place), observer_s, rests=run)["motor"]
+    quiet = hypothesis.blocks(replace(run, table_m=place), data.observer_s, data.steps, run)["motor"]
     rng = np.random.default_rng(0)
     for _ in range(_READINGS):
         offset = count * rng.random()
         read = place + _misread(place + offset, count, 0.0, rng)
-        other = hypothesis.blocks(replace(run, table_m=read), observer_s, rests=run)["motor"]
+        other = hypothesis.blocks(replace(run, table_m=read), data.observer_s, data.steps, run)["motor"]
         added += ((other - quiet)[run.evaluated] / scale) ** 2 / _READINGS
     near = maximum_filter1d(added, 2 * round(_NEAR_S / run.period_s) + 1) > 1.0
     if not near.any() or not np.isfinite(added).all():

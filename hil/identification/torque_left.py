@@ -36,6 +36,7 @@ from hil.identification.measured import Measured
 from hil.identification.plain_model import MotionData, PlainModel, SlowestSliding, fit_plain_model
 from hil.identification.structure import ResidualSeries
 from hil.identification.twin_deviation import held_on_motor
+from hil.twin.axis import Steps
 
 _ADDED = 0.01  # of the torque's standard deviation: far above rounding, and an axis that slides goes on sliding
 # Some rows that slide by the measured motion may not by that of a twin: quantile of the others; share of them that is
@@ -138,7 +139,7 @@ def needed_torque(hypothesis: Hypothesis, data: Dataset, plain: PlainModel, fast
     for run in data.runs:
         motion = measured_motion(run)
         rows = motion.sliding(plain.slowest)
-        innovation_with = partial(_innovation, hypothesis, run, data.observer_s, fast)
+        innovation_with = partial(_innovation, hypothesis, run, data.observer_s, data.steps_of(fast))
         lacking, sticks = _lacking(innovation_with, run, motion, rows, run.period_s / data.observer_s)
         found.append(ResidualSeries(-lacking, rows, sticks))
     return found
@@ -204,9 +205,9 @@ def lacking_torque(hypothesis: Hypothesis, data: Dataset) -> list[FloatArray]:
     return found
 
 
-def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, fast: bool, more: FloatArray) -> FloatArray:
+def _innovation(hypothesis: Hypothesis, run: Measured, observer_s: float, steps: Steps, more: FloatArray) -> FloatArray:
     """Measured less simulated motor position (n,) of a twin held on it, with more torque (n,) than the measured one."""
-    measured, held = held_on_motor(hypothesis, run, observer_s, more, fast)
+    measured, held = held_on_motor(hypothesis, run, observer_s, steps, more)
     return np.asarray(measured.motor_position - held.motor_position, dtype=np.float64)
 
 

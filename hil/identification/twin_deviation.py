@@ -30,7 +30,7 @@ from hil.identification.noise_floor import rms
 from hil.identification.residual_scales import inertia
 from hil.identification.residuals import differences
 from hil.identification.terms import Term
-from hil.twin.axis import Response
+from hil.twin.axis import Response, Steps
 from hil.twin.library import BY_ID
 from hil.twin.mechanism import Stage
 from hil.twin.physics import Active
@@ -104,7 +104,7 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
     if run.observability.torque_and_command:
         drive = Deviation("drive", name, unit, run.torque, run.torque - left["torque"], evaluated)
         blocks.append(BlockDeviation(drive, f"measured {name} command", run.noise.torque))
-    held = differences(*held_on_motor(hypothesis, run, data.observer_s), hypothesis.bench, evaluated)
+    held = differences(*held_on_motor(hypothesis, run, data.observer_s, data.steps), hypothesis.bench, evaluated)
     torque = inertia(data.bench) / data.observer_s**2  # torque per innovation
     motor = Deviation(MOTOR_BLOCK, name, unit, run.torque, run.torque + torque * held["motor"], evaluated)
     inputs = f"measured {name}, held on the measured motor position"
@@ -120,14 +120,14 @@ def compare_blocks(hypothesis: Hypothesis, data: Dataset) -> tuple[BlockDeviatio
 
 
 def held_on_motor(
-    hypothesis: Hypothesis, run: Measured, observer_s: float, more: FloatArray | float = 0.0, fast: bool = False
+    hypothesis: Hypothesis, run: Measured, observer_s: float, steps: Steps, more: FloatArray | float = 0.0
 ) -> tuple[Response, Response]:
     """Measured channels, lateness undone, and those of the twin held on the motor, driven by the measured torque.
 
-    It gets `more` torque (n,), by default none. `fast`: with the internal steps of a search.
-    Mechanisms of the drive and of the recorded channels are omitted: the measured torque already contains them.
+    It gets `more` torque (n,), by default none. Mechanisms of the drive and of the recorded channels are omitted: the
+    measured torque already contains them.
     """
-    twin = hypothesis.twin(observer_s, fast, run)
+    twin = hypothesis.twin(observer_s, steps, run)
     measured = hypothesis.undelayed(twin, run)
     mechanical = tuple(active for active in twin.active if not in_measured_torque(active))
     driven = measured.torque + more

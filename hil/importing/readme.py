@@ -19,6 +19,16 @@ from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
 # Counts of an encoder, 2^21; not within a sum or a product.
 _POWER = re.compile(r"(?<![\w.,*/^+-])2 ?(?:\^|\*\*) ?(\d{1,2})(?![\w.,]?\d|\s*[-+*/]\s*\d)")
+# Blanks between thousands of counts: 3 600 000 inc per table revolution.
+_BLANKS = re.compile(
+    r"(?<![\w.,])\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+(?=\s+(?:inc|ink|counts?\b|cnts?\b|pulses|impuls|steps|lines|cts\b))",
+    re.IGNORECASE,
+)
+_PER_LOAD_TURN = re.compile(  # 3600000 inc per table revolution
+    r"(?<![\w.,])(\d+)\s+(\w+)(?: ?/ ?| (?:per|pro|je|par) )"
+    r"(?:table|output|load|plate|joint|tisch|abtriebs?|last|gelenk)[ -]?(?:turn|rev|umdr|tour)",
+    re.IGNORECASE,
+)
 _LONGEST = 1_000_000  # bytes: no README is as long
 
 
@@ -51,11 +61,11 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     check_file(readme, "a text of the owner", _LONGEST)
     raw = readme.read_bytes().splitlines()
     encoding = encoding_of(raw)
-    lines = [_POWER.sub(lambda power: str(1 << int(power[1])), line.decode(encoding)) for line in raw]
+    lines = [_plain_numbers(line.decode(encoding)) for line in raw]
     titles = {table.titles.get(name, name): name for name in table.columns}
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
-    told = _by_number(lines, list(table.columns)) | told
+    told = _of_load(table, lines) | _by_number(lines, list(table.columns)) | told
     if parts := _last_parts(titles):
         told = {parts[part]: one for part, one in told_columns(lines, list(parts)).items()} | told
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
@@ -73,6 +83,23 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
         words={name: one.words for name, one in told.items() if one.words} | table.words,
         constants=constants | table.constants,
     )
+
+
+def _plain_numbers(line: str) -> str:
+    """A line with powers of two, and counts with blanks between thousands, as numbers."""
+    line = _POWER.sub(lambda power: str(1 << int(power[1])), line)
+    return _BLANKS.sub(lambda number: re.sub(r"\s", "", number[0]), line)
+
+
+def _of_load(table: ForeignTable, lines: list[str]) -> dict[str, ToldColumn]:
+    """The only column of the load's encoder in counts, as an angle, where a line tells its counts per turn."""
+    labels = {name: label(table.titles.get(name, name)) for name in table.columns}
+    loads = [name for name, one in labels.items() if one.table and not one.command and is_whole(table.columns[name])]
+    counted = [name for name in loads if _own_unit(table, name) in (None, "counts")]
+    found = {float(one[1]) for line in lines for one in _PER_LOAD_TURN.finditer(line) if unit_named(one[2]) == "counts"}
+    if len(counted) != 1 or len(found) != 1 or 0.0 in found:
+        return {}
+    return {counted[0]: ToldColumn("", "deg", 360.0 / found.pop())}
 
 
 def _by_number(lines: list[str], columns: list[str]) -> dict[str, ToldColumn]:

@@ -22,18 +22,27 @@ from hil.twin.stepping.static_equilibrium import settle
 from hil.twin.structure.chain import Chain
 from hil.twin.structure.modal import Modal, lowest_modes
 
-# Internal steps. Fine: the friction impulse of the step in which the motor reverses is right to Fc x 20 us, 0.003 N m
-# of velocity-loop torque on the reference axis, below its current noise. Coarse: sliding friction is constant over a
-# step, modes are exact.
-FINE_STEP_S = 20e-6
-COARSE_STEP_S = 200e-6
-# Both are for rows of 1 ms, and grow with longer ones, whose torque is held for longer: up to 4 times, and as far as a
-# fine step is short against the fastest mode [rad], for forces of the transmission that act against its spring.
+# Internal steps grow with rows longer than 1 ms, whose torque is held for longer: up to 4 times, and as far as a fine
+# step is short against the fastest mode [rad], for forces of the transmission that act against its spring.
 _ROWS_S, _MOST_GROWTH, _SHORT_RAD = 1e-3, 4.0, 0.4
 
 _NOTHING = np.empty(0)
 _RIGHT = np.empty((2, 0))
 _ANSWER = "torque"  # the recorded channel that is an answer of the axis only, and no input of any block
+
+
+class Steps(NamedTuple):
+    """Longest internal steps of a twin at ticks of 1 ms [s]: fine about a reversal, else coarse; equal: a fixed step.
+
+    Of 20 us the friction impulse of the step in which the motor reverses is right to 0.003 N m of velocity-loop torque
+    on the reference axis, below its current noise. Sliding friction is constant over a coarse step; modes are exact.
+    """
+
+    fine_s: float = 20e-6
+    coarse_s: float = 200e-6
+
+
+TWIN_STEPS = Steps()
 
 
 class Response(NamedTuple):
@@ -62,17 +71,15 @@ _AT_REST = Start()
 class Twin:
     """Axis with its control law and its active mechanisms.
 
-    `modes` keeps only the lowest modes of the chain (None: all). `fine_step_s` and `coarse_step_s` are the longest
-    internal steps at ticks of 1 ms, of which a whole number makes a tick; equal values give a fixed step. `push_n` (n,)
-    is a force on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
+    `modes` keeps only the lowest modes of the chain (None: all). A whole number of internal `steps` makes a tick.
+    `push_n` (n,) is a force on the table over each tick of a simulation, beside those of the mechanisms; empty: none.
     """
 
     physics: Physics
     gains: cascade.Gains
     active: Sequence[Active] = ()
     modes: int | None = None
-    coarse_step_s: float = COARSE_STEP_S
-    fine_step_s: float = FINE_STEP_S
+    steps: Steps = TWIN_STEPS
     observer_s: float = loops.OBSERVER_S
     push_n: FloatArray = field(default_factory=lambda: _NOTHING)
 
@@ -93,10 +100,10 @@ class Twin:
     @cached_property
     def _arrays(self) -> Arrays:
         period_s, fastest = self.gains.period_s, float(np.max(self.modal.frequency_rad_s))
-        growth = min(period_s / _ROWS_S, _MOST_GROWTH, _SHORT_RAD / max(fastest * self.fine_step_s, 1e-9))
+        growth = min(period_s / _ROWS_S, _MOST_GROWTH, _SHORT_RAD / max(fastest * self.steps.fine_s, 1e-9))
         coarse, fine = (
             max(math.ceil(period_s / (max(growth, 1.0) * longest_s) - 1e-6), 1)
-            for longest_s in (self.coarse_step_s, self.fine_step_s)
+            for longest_s in (self.steps.coarse_s, self.steps.fine_s)
         )
         arrays = pack(self.physics, self.chain, self.modes, self.gains, self.active, (coarse, fine), self.observer_s)
         arrays.constants["any_active"] |= self.push_n.size > 0

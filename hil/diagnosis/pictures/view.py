@@ -82,7 +82,7 @@ Drawer = Callable[["Diagnosis", Sequence[View]], Captioned]
 def view_of(diagnosis: Diagnosis, run: Measured, term: Term) -> View:
     """Simulate a run without a term of the final hypothesis."""
     final, observer_s = diagnosis.final, diagnosis.train.observer_s
-    before = without_terms(final.hypothesis, term).blocks(run, observer_s)
+    before = without_terms(final.hypothesis, term).blocks(run, observer_s, diagnosis.train.steps)
     after = diagnosis.residuals(final, run)
     torque, torque_after = (torque_of(run, values["motor"], final.bench, observer_s) for values in (before, after))
     return View(term, run, before, after, torque, torque_after)

@@ -29,6 +29,7 @@ from hil.diagnosis.search.shape import log_chance_below_noise
 from hil.diagnosis.stages import Prepared, Progress, Searched
 from hil.identification.estimator import Fit
 from hil.identification.inference import bic_gain, bic_margin, standard_errors, whitening
+from hil.identification.internal_steps import longest_steps
 from hil.identification.noise_apart import noise_apart
 from hil.identification.nominal_fit import fit_nominal_parameters, require_finite
 from hil.identification.parallel import in_parallel
@@ -106,6 +107,8 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     step("refitting the nominal parameters")
     base = fit_nominal_parameters(prepared.train, deadline_s=deadline_s)
     require_finite(base)
+    prepared = prepared.with_steps(longest_steps(base))
+    base = carried(prepared.train, base)
     given, nominal = base.estimator.evaluate(base.hypothesis.given), base
     begun = given, nominal
     rivals, needed, considered = dict[Key, list[RivalFit]](), dict[Key, float](), list[Considered]()

@@ -35,7 +35,7 @@ def energy_without_noise(found: Fit, without: Fit) -> float | None:
             torque=response.torque,
         )
         own, other = (
-            fit.hypothesis.blocks(smooth, found.data.observer_s)
+            fit.hypothesis.blocks(smooth, found.data.observer_s, found.data.steps)
             | {name: fit.residuals.channels[index][name] for name in ("torque", "command")}
             for fit in (found, without)
         )

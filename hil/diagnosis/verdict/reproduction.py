@@ -13,6 +13,7 @@ from hil.identification.estimator import Fit
 from hil.identification.torque_left import fit_plain, left_by_plain, torque_deviation, torque_missed
 
 _TABLE = "table"
+_WANDERS = 25.0  # mean square over its noise up to which an encoder may wander: five times in rms
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,8 @@ class Reproduced:
     """What a twin leaves.
 
     `worst` and `held_out`: largest mean square of a channel over its noise, in training and on held-out recordings,
-    without a second encoder whose remainder is like noise (`like_noise`): encoders wander. `noisy`: the noise of a
-    measured torque drives the twin. Beside them the strongest structure in words, and the torque missed on held-out
+    without a second encoder whose remainder is like noise (`like_noise`): encoders wander by some times their noise.
+    `noisy`: the noise of a measured torque drives the twin. Beside them the strongest structure in words, and the torque missed on held-out
     motion by the twin and by the plain model, over its deviation (rms). None where there is nothing held out, or no
     torque.
     """
@@ -48,7 +49,8 @@ def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
 
 def _worst(fit: Fit, noise: Collection[str]) -> float:
     """Largest mean square over its noise of the channels whose remainder is more than `noise`; 1 without any."""
-    return max((one for run in fit.noise_ratios for name, one in run.items() if name not in noise), default=1.0)
+    ratios = [(name, one) for run in fit.noise_ratios for name, one in run.items()]
+    return max((one for name, one in ratios if name not in noise or one > _WANDERS), default=1.0)
 
 
 def behind_plain(judged: Judged) -> bool:

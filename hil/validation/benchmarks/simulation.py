@@ -13,7 +13,7 @@ from hil.loop.simulated_bench import make_plant
 from hil.loop.virtual import compiled_ticks
 from hil.motion.trajectory import Trajectory
 from hil.recording.writer import Recorder
-from hil.twin.axis import Twin
+from hil.twin.axis import Steps, Twin
 from hil.validation.benchmarks.axis import MOVES, trajectory, twenty_modes, two_mass
 from hil.validation.benchmarks.figure import Figure, Reference, ReferenceKind, best_of
 
@@ -66,7 +66,7 @@ def figures() -> list[Figure]:
     bench = twenty_modes()
     whole = Twin(bench.axis.physics(), bench.gains)
     tick_s = bench.gains.period_s
-    plain = Twin(bench.axis.physics(), bench.gains, coarse_step_s=tick_s, fine_step_s=tick_s)
+    plain = Twin(bench.axis.physics(), bench.gains, steps=Steps(tick_s, tick_s))
     real = "x real time"
     alone = (Reference("axis alone", ReferenceKind.LIMIT, axis_alone()),)
     return [

@@ -22,6 +22,7 @@ from hil.identification.hypothesis import Hypothesis
 from hil.identification.residual_scales import follows
 from hil.identification.terms import Term
 from hil.recording.recording import read_recording
+from hil.twin.axis import TWIN_STEPS
 from hil.twin.library import BY_ID
 from hil.twin.structure.modal import modal
 
@@ -85,7 +86,7 @@ def test_only_springs_with_a_noisy_torque_and_a_fine_encoder_are_judged_so(draft
 def test_no_torque_is_in_the_second_encoder(drafted: Dataset) -> None:
     (run,), hypothesis = drafted.runs, Hypothesis(drafted.bench)
     other = replace(run, torque=np.zeros_like(run.torque), torque_command=np.zeros_like(run.torque))
-    left, without = (second_encoder(hypothesis, one, drafted.observer_s, False)["table"] for one in (run, other))
+    left, without = (second_encoder(hypothesis, one, drafted.observer_s, TWIN_STEPS)["table"] for one in (run, other))
     np.testing.assert_array_equal(left, without)
     driven = [hypothesis.driven(one, drafted.observer_s)["table"] for one in (run, other)]
     assert not np.allclose(*driven)
@@ -101,13 +102,13 @@ def test_rows_that_are_far_apart_leave_little_behind_the_motor(tmp_path: Path) -
     data = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "bench.yaml")).train
     (run,) = data.runs
     assert follows(run, True, data.observer_s)
-    left = second_encoder(Hypothesis(data.bench), run, data.observer_s, False)["table"][run.evaluated]
+    left = second_encoder(Hypothesis(data.bench), run, data.observer_s, TWIN_STEPS)["table"][run.evaluated]
     assert float(np.std(left)) < 2.5 * run.noise.table_m
 
 
 def test_a_light_motor_leaves_little_behind_it(drafted: Dataset) -> None:
     (run,), hypothesis = drafted.runs, Hypothesis(drafted.bench)
-    left = second_encoder(hypothesis, run, drafted.observer_s, False)["table"][run.evaluated]
+    left = second_encoder(hypothesis, run, drafted.observer_s, TWIN_STEPS)["table"][run.evaluated]
     assert float(np.std(left)) < 3.0 * run.noise.table_m
 
 
@@ -118,5 +119,6 @@ def test_what_changes_the_torque_alone_is_not_in_the_second_encoder(drafted: Dat
     (run,), hypothesis = drafted.runs, Hypothesis(drafted.bench)
     values = BY_ID[effect].typical_values(axis_facts(drafted.bench, drafted.runs))
     with_term = hypothesis.with_term(Term(effect, 0, values))
-    left, without = (second_encoder(one, run, drafted.observer_s, False)["table"] for one in (with_term, hypothesis))
+    both = (with_term, hypothesis)
+    left, without = (second_encoder(one, run, drafted.observer_s, TWIN_STEPS)["table"] for one in both)
     np.testing.assert_allclose(left, without, atol=0.01 * run.noise.table_m)

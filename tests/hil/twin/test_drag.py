@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hil.control import cascade
-from hil.twin.axis import Start, Twin
+from hil.twin.axis import Start, Steps, Twin
 from hil.twin.physics import Active, Physics
 from hil.twin.structure.chain import LINEAR_LEAD_M, one_mass, two_mass
 
@@ -68,7 +68,7 @@ def test_a_lubricant_that_thins_changes_viscous_friction_alone() -> None:
 )
 def test_drag_stops_a_coasting_axis_and_never_turns_it_round(active, contact) -> None:
     """One step per tick and drag that could stop the axis many times over within it."""
-    coasting = twin(active, *contact, coarse_step_s=GAINS.period_s, fine_step_s=GAINS.period_s)
+    coasting = twin(active, *contact, steps=Steps(GAINS.period_s, GAINS.period_s))
     found = speeds(coasting.drive(np.zeros(400), Start(0.0, SPEED_M_S)))
     # an elastic contact gives back what it took: Fc^2 / 2 k of energy
     springs_back = np.sqrt(COULOMB_N**2 / 4e6 / MASS_KG) if contact else 1e-12
@@ -81,7 +81,9 @@ def test_a_step_across_rest_agrees_with_fine_steps() -> None:
     """Force that swings the axis to and fro through rest, where the drag of a thinning lubricant is steepest."""
     time_s = np.arange(4000) * GAINS.period_s
     force = 60.0 * np.sin(2.0 * np.pi * time_s)
-    coarse, fine = (twin(thinning(2000.0), fine_step_s=step_s).drive(force).motor_position for step_s in (2e-5, 2e-6))
+    coarse, fine = (
+        twin(thinning(2000.0), steps=Steps(fine_s=step_s)).drive(force).motor_position for step_s in (2e-5, 2e-6)
+    )
     assert np.ptp(fine) > 0.01
     np.testing.assert_allclose(coarse, fine, atol=2e-5 * np.ptp(fine))
 

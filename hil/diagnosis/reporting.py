@@ -90,7 +90,7 @@ def report(judged: Judged, progress: Progress, begin_s: float, budget_s: float) 
     sentences = [of_plant, law.advice] if found or judged.change else [law.advice, of_plant]
     of_bench = nominal if judged.of_plant is Verdict.AXIS_CHANGED else final
     changes = {one.name for one in judged.change.summary.parameters} if judged.change else set[str]()
-    sentences += [in_bench(of_bench, held_out, changes), _following(prepared)]
+    sentences += [in_bench(of_bench, held_out, changes, prepared.told), _following(prepared)]
     result = result.model_copy(update={"statement": " ".join(filter(None, sentences))})
     return Reported(judged, result, _bench(judged), experiment)
 

@@ -46,6 +46,7 @@ class Prepared:
     bench_file: Bench
     law: LawCheck
     notes: tuple[str, ...] = ()
+    told: Mapping[str, float] = field(default_factory=dict)  # values of the axis that its owner tells, by name
 
     def with_steps(self, steps: Steps) -> Prepared:
         """The same with other internal steps of the twin."""

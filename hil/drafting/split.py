@@ -9,10 +9,9 @@ from math import hypot, pi
 from typing import NamedTuple
 
 from hil.identification.least_squares import Estimate
-from hil.importing.by_map import NOMINAL_MASSES
 from hil.importing.lexicon import Constant
 from hil.quantities import quantity
-from hil.recording.recording import Recording
+from hil.recording.recording import NOMINAL, Recording
 
 _OWNER = 0.1  # of the smaller part: data sheets and weighed parts are a few per cent off
 _LEAST = 1e-3  # share of a part: less is an error of a unit, or of the sum
@@ -42,7 +41,7 @@ def nominal_sum(recording: Recording, lead_m: float, turns: bool) -> Estimate | 
 
 def _parts(recording: Recording, lead_m: float, turns: bool) -> tuple[float, float]:
     """Inertia of motor and load at the motor [kg m^2] as the owner tells them; 0: not told."""
-    told, factor = recording.metadata.get(NOMINAL_MASSES, {}), (lead_m / (2.0 * pi)) ** 2
+    told, factor = recording.metadata.get(NOMINAL, {}), (lead_m / (2.0 * pi)) ** 2
     load = told.get(Constant.LOAD_INERTIA if turns else Constant.LOAD_MASS, 0.0)
     return told.get(Constant.MOTOR_INERTIA, 0.0), factor * load
 
@@ -51,7 +50,7 @@ def split_of(total: Estimate, recording: Recording, lead_m: float, turns: bool) 
     """Parts of a total inertia, in units of the motor [kg m^2]: by the owner's words, else half and half."""
     motor, load = _parts(recording, lead_m, turns)
     share = load / (load + motor) if load and motor else load / total.value if load else 1.0 - motor / total.value
-    told = recording.metadata.get(NOMINAL_MASSES, {})
+    told = recording.metadata.get(NOMINAL, {})
     of = (Constant.LOAD_INERTIA if turns else Constant.LOAD_MASS, Constant.MOTOR_INERTIA)
     words = ", ".join(
         f"{quantity(told[key], unit)} {whose}" for key, whose, unit in _WORDS if key in of and key in told

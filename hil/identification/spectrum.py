@@ -65,7 +65,7 @@ def spectrum(residual: Series, columns: Sequence[Series], counted: Rows) -> Nois
     while edges[-1] + least < size // 2:
         edges.append(max(_WIDTH * edges[-1], edges[-1] + least))
     first = np.unique(np.ceil(np.array(edges[:-1] or edges)).astype(np.intp))
-    taken = np.sum([_energy(one, size, first) for one in columns], axis=0) if columns else 0.0
+    taken = sum((_energy(runs, size, first) for runs in zip(*columns, strict=True)), np.zeros(first.size))
     independent = np.maximum(rows * np.add.reduceat(_both_signs(size), first) / size - taken, 1.0)
     variance, told = _moderated(_energy(residual, size, first) / independent, independent)
     return NoiseSpectrum(_sharpened(variance, counted, size, first), told, rows, size, first)
@@ -121,6 +121,8 @@ def _both_signs(size: int) -> FloatArray:
 
 
 def _energy(series: Series, size: int, first: NDArray[np.intp]) -> FloatArray:
-    """Energy (b,) of a series within each band."""
-    found = np.sum([np.abs(np.fft.rfft(one, size)) ** 2 for one in series], axis=0)
+    """Energy (b,) of a series within each band, or of several of one run."""
+    alike = len({one.size for one in series}) == 1
+    each = np.fft.rfft(np.stack(series), size) if alike else [np.fft.rfft(one, size) for one in series]
+    found = np.sum([part.real**2 + part.imag**2 for part in each], axis=0)
     return np.asarray(np.add.reduceat(_both_signs(size) * found, first) / size)

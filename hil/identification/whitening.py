@@ -6,7 +6,6 @@ A slow residual, such as that of a wrong friction law, then hides no faster effe
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from hil.arrays import FloatArray
 from hil.identification.spectrum import Rows
@@ -35,9 +34,10 @@ def filtered(values: FloatArray, rows: Rows, taps: FloatArray) -> FloatArray:
     """Values (m,) of the rows that count, filtered run by run; between stretches of rows they go on evenly."""
     found = []
     for one, at in zip(np.split(values, np.cumsum([int(at.sum()) for at in rows])[:-1]), rows, strict=True):
-        even = np.interp(np.arange(at.size), np.flatnonzero(at), one) if one.size else np.zeros(at.size)
-        found.append(lfilter(taps, [1.0], even)[at])
-    return np.concatenate(found)
+        if one.size:
+            even = one if one.size == at.size else np.interp(np.arange(at.size), np.flatnonzero(at), one)
+            found.append(np.convolve(even, taps)[: at.size][at])
+    return np.concatenate([*found, np.zeros(0)])
 
 
 def spread(values: FloatArray, at: NDArray[np.bool_]) -> FloatArray:

@@ -20,12 +20,11 @@ from hil.importing.rows import complete_rows
 from hil.importing.units import base_of
 from hil.importing.wraps import unwrapped
 from hil.recording.quantum import count_of
-from hil.recording.recording import CLOCK_NOTES, Recording, clock_metadata
+from hil.recording.recording import CLOCK_NOTES, NOMINAL, Recording, clock_metadata
 from hil.recording.stamps import RegularRows, regular_rows
 
 EPOCH_S = 1e6  # start of a clock that counts from 1970 or year 0: its large numbers have few digits for the steps
 STEP = "step"  # key of a channel's metadata: step of its values before they are interpolated
-NOMINAL_MASSES = "nominal"  # key of the metadata: what the owner tells of the parts of the axis, by keys of the map
 ONE = "constant_of_one"  # key of a channel's metadata: constant of its effort that is 1 in the map, perhaps unknown
 
 
@@ -103,7 +102,7 @@ def import_recording(source: str | Path, map_path: str | Path) -> Recording:
     }
     metadata |= clock_metadata(rows)
     if nominal := the_map.nominal.model_dump(exclude_none=True):
-        metadata[NOMINAL_MASSES] = nominal
+        metadata[NOMINAL] = nominal
     if notes := [*foreign.notes, *complete.notes, *rows.notes, *geared]:
         metadata[CLOCK_NOTES] = notes
     return Recording(source.stem, columns, rows.period_s, metadata)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hil.importing.lexicon import Constant, ConstantWords, lexicon, without_accents
-from hil.importing.nominal_values import mass_told
+from hil.importing.nominal_values import nominal_told
 from hil.importing.units import unit_named
 from hil.importing.values_behind import Statement, size_of_count, told_behind
 from hil.quantities import UNITS
@@ -82,8 +82,8 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
     # what is said of the motor goes before what words say, and that before what a unit alone says
     found: dict[Constant, dict[tuple[bool, bool], list[HeaderValue]]] = {}
     for one in given:
-        if mass := mass_told(one):
-            found.setdefault(mass[0], {}).setdefault((False, True), []).append(HeaderValue(mass[1], one.text))
+        if part := nominal_told(one):
+            found.setdefault(part[0], {}).setdefault((False, True), []).append(HeaderValue(part[1], one.text))
             continue
         units = one.units if any(one.units) else (*one.units, None)
         if told := next((known for unit in units if (known := _constant(one, unit))), None):

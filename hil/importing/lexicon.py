@@ -70,9 +70,14 @@ class Constant(StrEnum):
     LOAD_MASS = "load_mass_kg"  # of a load that slides
     LOAD_INERTIA = "load_inertia_kg_m2"  # of a load that turns, at the load
     MOTOR_INERTIA = "motor_inertia_kg_m2"  # of the motor and what turns with it, without its load
+    STIFFNESS = "stiffness_n_m"  # of the transmission, at a load that slides
+    TORSION = "stiffness_n_m_rad"  # at a load that turns
 
 
-NOMINAL = (Constant.LOAD_MASS, Constant.LOAD_INERTIA, Constant.MOTOR_INERTIA)  # told in sentences, see `nominal_values`
+# Told in sentences, see `nominal_values`.
+NOMINAL = (
+    Constant.LOAD_MASS, Constant.LOAD_INERTIA, Constant.MOTOR_INERTIA, Constant.STIFFNESS, Constant.TORSION,
+)  # fmt: skip
 
 
 def _lines(given: object) -> list[str]:
@@ -113,13 +118,20 @@ class ConstantWords(_Entry):
 
 
 class MassWords(_Entry):
-    """Words of what a mass or an inertia is of, and of one that is not of the load, or not of the motor, alone."""
+    """Words of what a mass or an inertia is of, and of one that is not of the load, or not of the motor, alone.
+
+    And the words of a stiffness, and of one that is not that of the whole transmission.
+    """
 
     load: Words
     motor: Words
     neither: Words
+    stiffness: Words
+    other_stiffness: Words
     mass_units: dict[str, PositiveFloat]
     inertia_units: dict[str, PositiveFloat]
+    stiffness_units: dict[str, PositiveFloat]
+    torsion_units: dict[str, PositiveFloat]
 
 
 class ScalarNames(_Entry):

@@ -176,8 +176,8 @@ class ChannelSource(_Strict):
         return None if factor is None else self.sign * self.scale * constant * factor
 
 
-class NominalMasses(_Strict):
-    """What the owner tells of the parts of an axis; a recording tells their sum alone."""
+class NominalValues(_Strict):
+    """What the owner tells of the parts of an axis; of the masses a recording tells the sum alone."""
 
     load_mass_kg: PositiveFloat | None = Field(default=None, description="of a load that slides [kg]")
     load_inertia_kg_m2: PositiveFloat | None = Field(
@@ -185,6 +185,12 @@ class NominalMasses(_Strict):
     )
     motor_inertia_kg_m2: PositiveFloat | None = Field(
         default=None, description="of the motor and what turns with it, without the load [kg m^2]"
+    )
+    stiffness_n_m: PositiveFloat | None = Field(
+        default=None, description="of the transmission, at a load that slides [N/m]"
+    )
+    stiffness_n_m_rad: PositiveFloat | None = Field(
+        default=None, description="of the transmission, at a load that turns [N m/rad]"
     )
 
 
@@ -206,8 +212,9 @@ class RecordingMap(_Strict):
     )
     csv: CsvOptions = Field(default=CsvOptions(), description="how a CSV file is written")
     lead_m: PositiveFloat | None = Field(default=None, description="lead of the screw, to convert angle and length")
-    nominal: NominalMasses = Field(
-        default=NominalMasses(), description="masses of the parts of the axis, which split the one that is found"
+    nominal: NominalValues = Field(
+        default=NominalValues(),
+        description="masses of the parts of the axis, which split the one that is found, and its stiffness to compare",
     )
     channels: dict[str, ChannelSource] = Field(description="channel name -> where it comes from")
 

@@ -54,7 +54,7 @@ def map_text(draft: MapDraft) -> str:
     elif draft.lead_m is not None:
         lines += [f"lead_m: {draft.lead_m!r}   # m per revolution of the motor; {draft.lead_how}"]
     told = [(one, draft.table.constants[one]) for one in NOMINAL if one in draft.table.constants]
-    lines += ["nominal:                  # masses of the parts, which split the one that is found"] if told else []
+    lines += ["nominal:                  # of the parts: masses split the one that is found"] if told else []
     lines += [f"  {one}: {_value(value.value)}   # {value.text}" for one, value in told]
     lines += [*_KEYS.rstrip().splitlines(), "channels:"]
     for one in draft.channels:

@@ -1,4 +1,4 @@
-"""Masses and inertias that an owner tells in sentences: of the load, of the motor.
+"""Masses, inertias and the stiffness that an owner tells in sentences: of the load, of the motor, between them.
 
 "Table with fixture about 335 kg. Motor + coupling + screw about 2.8e-3 kg m2." Recordings tell their sum alone below
 the resonance of the transmission. Words between the last number and this one tell whose it is. A sum of both, a limit,
@@ -16,7 +16,22 @@ _OF_LINE = re.compile(rf"^(?:\w+ )?(?:{_INERTIA.pattern})(?: about the axis)?$")
 _GOES_ON = re.compile(r"k?g[cm]?m|kg(?:\+|plus).*")  # kg m, kg plus others
 
 
-def mass_told(told: Statement) -> tuple[Constant, float] | None:
+def nominal_told(told: Statement) -> tuple[Constant, float] | None:
+    """Constant and value [SI] of a mass, an inertia or a stiffness that a statement tells; None for others."""
+    return _stiffness_told(told) or _mass_told(told)
+
+
+def _stiffness_told(told: Statement) -> tuple[Constant, float] | None:
+    """Stiffness of the whole transmission; that of a part, or of a stop, tells nothing."""
+    known, words = lexicon().masses, told.sentence.split()
+    says = any(_is_one_of(word, known.stiffness) for word in words)
+    if not says or any(_is_one_of(word, known.other_stiffness) for word in words) or not told.number > 0.0:
+        return None
+    kinds = ((Constant.STIFFNESS, known.stiffness_units), (Constant.TORSION, known.torsion_units))
+    return next(((kind, units[one] * told.number) for one in told.units for kind, units in kinds if one in units), None)
+
+
+def _mass_told(told: Statement) -> tuple[Constant, float] | None:
     """Constant and value [SI] of a statement; None for one that tells neither mass nor inertia of one part."""
     known, words = lexicon().masses, told.sentence.split()
     if _OF_LINE.search(told.sentence):  # arm 4.5 kg, inertia about the axis 0.9 kg m^2

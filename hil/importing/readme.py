@@ -19,9 +19,10 @@ from hil.importing.units import QUANTITY_OF_UNIT, unit_named
 
 # Counts of an encoder, 2^21; not within a sum or a product.
 _POWER = re.compile(r"(?<![\w.,*/^+-])2 ?(?:\^|\*\*) ?(\d{1,2})(?![\w.,]?\d|\s*[-+*/]\s*\d)")
-# Blanks between thousands of counts: 3 600 000 inc per table revolution.
+# Blanks between thousands: 3 600 000 inc per table revolution, 22 000 Nm/rad.
 _BLANKS = re.compile(
-    r"(?<![\w.,])\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+(?=\s+(?:inc|ink|counts?\b|cnts?\b|pulses|impuls|steps|lines|cts\b))",
+    r"(?<![\w.,])\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+"
+    r"(?=\s+(?:inc|ink|counts?\b|cnts?\b|pulses|impuls|steps|lines|cts\b|nm/rad))",
     re.IGNORECASE,
 )
 _PER_LOAD_TURN = re.compile(  # 3600000 inc per table revolution
@@ -86,7 +87,7 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
 
 
 def _plain_numbers(line: str) -> str:
-    """A line with powers of two, and counts with blanks between thousands, as numbers."""
+    """A line with powers of two, and numbers with blanks between thousands, as plain numbers."""
     line = _POWER.sub(lambda power: str(1 << int(power[1])), line)
     return _BLANKS.sub(lambda number: re.sub(r"\s", "", number[0]), line)
 

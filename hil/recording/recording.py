@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 PARTS = "parts"  # key of the metadata: row and time_s of each part, if there are gaps between them
 CLOCK_NOTES = "clock_notes"  # key of the metadata: what was done to the stamps
+NOMINAL = "nominal"  # key of the metadata: what the owner tells of the parts of the axis, by keys of the map
 RESAMPLED = "resampled"  # key of the metadata: the rows are not those of the control loop
 
 

@@ -12,7 +12,7 @@ from hil.diagnosis.stages import Prepared
 from hil.errors import InputError
 from hil.identification.dataset import prepare_dataset
 from hil.identification.derived_channels import completed, reduced
-from hil.recording.recording import Recording
+from hil.recording.recording import NOMINAL, Recording
 
 
 def prepare(train: Sequence[Recording], validate: Sequence[Recording], bench: Bench) -> Prepared:
@@ -20,6 +20,7 @@ def prepare(train: Sequence[Recording], validate: Sequence[Recording], bench: Be
 
     Raises InputError with all reasons if the recordings cannot be diagnosed.
     """
+    told = train[0].metadata.get(NOMINAL, {}) if train else {}
     parts, proof = usable_parts(train, bench, not validate), usable_parts(validate, bench, False)
     notes = (*parts.notes, *proof.notes)
     train, whole, validate = list(parts.recordings), list(parts.whole), list(proof.recordings or parts.held_out)
@@ -48,4 +49,4 @@ def prepare(train: Sequence[Recording], validate: Sequence[Recording], bench: Be
             measured = preflight(runs, usable).accepted()
     measured = law.without_command(measured)
     data = prepare_dataset(measured[: len(train)], usable)
-    return Prepared(data, data.over(measured[len(train) :]), usable, bench, law, (*notes, *law.notes))
+    return Prepared(data, data.over(measured[len(train) :]), usable, bench, law, (*notes, *law.notes), told)

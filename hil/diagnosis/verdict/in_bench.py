@@ -1,6 +1,6 @@
 """What the bench has already, as a draft has it, of what recordings tell."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -19,10 +19,14 @@ from hil.identification.torque_left import fit_plain, left_by_twin
 from hil.quantities import quantity, unit_of
 from hil.twin.library import BY_ID
 
+_DATA_SHEET = 0.3  # of a stiffness: those of catalogues are of parts, and of a nut without its load
 
-def in_bench(final: Fit, held_out: Dataset, changes: Collection[str] = ()) -> str:
+
+def in_bench(
+    final: Fit, held_out: Dataset, changes: Collection[str] = (), owner: Mapping[str, float] | None = None
+) -> str:
     """Springs, a lateness of the torque of more than a row, and mechanisms of the bench that are above their errors and
-    matter; empty without. Parameters that change are told elsewhere.
+    matter; empty without. Parameters that change are told elsewhere. A stiffness beside that which the `owner` tells.
     """
     hypothesis = final.hypothesis
     # a fit at the values of the bench file has no derivatives, and these values no errors
@@ -32,7 +36,11 @@ def in_bench(final: Fit, held_out: Dataset, changes: Collection[str] = ()) -> st
         if unit_of(name) == "1" or name in changes:  # damping, or a factor on a stiffness, is no size of a spring
             continue
         if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
-            told.append(f"A spring of {quantity(getattr(axis, name), unit_of(name))} in the transmission.")
+            spring, unit = getattr(axis, name), unit_of(name)
+            departs = (
+                f" ({text})" if (text := _as_told(spring, errors.get(name, 0.0), (owner or {}).get(name), unit)) else ""
+            )
+            told.append(f"A spring of {quantity(spring, unit)} in the transmission{departs}.")
     delay_s = hypothesis.resolved.bench.torque_delay_s
     acts_s = (delay_s or 0.0) + 0.5 * final.bench.period_s  # the twin holds each value for a row
     error_s = SIGMAS * errors.get(DELAY, 0.0)
@@ -54,6 +62,13 @@ def in_bench(final: Fit, held_out: Dataset, changes: Collection[str] = ()) -> st
             told.append(text + _before(kept, final, known[mechanism.strength]))
     where = "The bench file has already, here refitted" if final.jacobian.size else "The bench file has already"
     return f"{where}: {' '.join(told)}" if told else ""
+
+
+def _as_told(value: float, error: float, owner: float | None, unit: str) -> str:
+    """By how much a value departs from what the owner tells, in words; empty within its errors and those of parts."""
+    if owner is None or abs(value - owner) <= max(SIGMAS * error, _DATA_SHEET * owner):
+        return ""
+    return f"{value / owner - 1.0:+.0%} against the {quantity(owner, unit)} that its owner tells".replace("%", " %")
 
 
 def _before(kept: MechanismEntry, final: Fit, error: float) -> str:

@@ -1,19 +1,24 @@
 """How well a twin without new terms reproduces recordings: noise, structure, and torque beside the plain model."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass
+
+import numpy as np
 
 from hil.diagnosis.criteria import CRITERIA
 from hil.diagnosis.ledger import Ledger, examine
 from hil.diagnosis.reproduced import REPRODUCED
 from hil.diagnosis.stages import Judged
-from hil.diagnosis.structure_left import like_noise, structure_left
+from hil.diagnosis.structure_left import DIFFERENCE, left_in_channel, like_noise, structure_left
 from hil.identification.dataset import Dataset
 from hil.identification.estimator import Fit
+from hil.identification.intended_motion import intended_motion
 from hil.identification.torque_left import fit_plain, left_by_plain, torque_deviation, torque_missed
 
 _TABLE = "table"
-_WANDERS = 25.0  # mean square over its noise up to which an encoder may wander: five times in rms
+_WANDERS = 25.0  # mean square over its noise up to which an encoder may wander as slowly as the axis moves: five in rms
+_MOTION = 0.9  # share of the energy of the velocity below the frequency up to which the axis moves
 
 
 @dataclass(frozen=True)
@@ -21,10 +26,10 @@ class Reproduced:
     """What a twin leaves.
 
     `worst` and `held_out`: largest mean square of a channel over its noise, in training and on held-out recordings,
-    without a second encoder whose remainder is like noise (`like_noise`): encoders wander by some times their noise.
-    `noisy`: the noise of a measured torque drives the twin. Beside them the strongest structure in words, and the torque missed on held-out
-    motion by the twin and by the plain model, over its deviation (rms). None where there is nothing held out, or no
-    torque.
+    without a second encoder whose remainder is like noise (`like_noise`) and faster than the motion, or small.
+    `noisy`: the noise of a measured torque drives the twin. Beside them the strongest structure in words, and the
+    torque missed on held-out motion by the twin and by the plain model, over its deviation (rms). None where there is
+    nothing held out, or no torque.
     """
 
     worst: float
@@ -38,8 +43,9 @@ def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
     """Answers of the rules on a twin without new terms."""
     structure = structure_left(fit, held_out)
     noise = like_noise(fit, structure) & {_TABLE}
-    worst = _worst(fit, noise)
-    elsewhere = _worst(fit.on(held_out), noise) if held_out.runs else None
+    most = math.inf if noise and _faster_than_motion(fit) else _WANDERS
+    worst = _worst(fit, noise, most)
+    elsewhere = _worst(fit.on(held_out), noise, most) if held_out.runs else None
     words = structure[0].in_words(fit.bench.axis.drive_unit) if structure else ""
     left, plain = torque_missed(fit, held_out), _missed_by_plain(fit, held_out)
     torque = None if left is None or plain is None else (left, plain)
@@ -47,10 +53,27 @@ def reproduction(fit: Fit, held_out: Dataset) -> Ledger:
     return examine(REPRODUCED, Reproduced(worst, noisy, elsewhere, words, torque), CRITERIA)
 
 
-def _worst(fit: Fit, noise: Collection[str]) -> float:
-    """Largest mean square over its noise of the channels whose remainder is more than `noise`; 1 without any."""
+def _worst(fit: Fit, noise: Collection[str], most: float) -> float:
+    """Largest mean square over its noise of the channels whose remainder is more than `noise`, up to `most`; 1 else."""
     ratios = [(name, one) for run in fit.noise_ratios for name, one in run.items()]
-    return max((one for name, one in ratios if name not in noise or one > _WANDERS), default=1.0)
+    return max((one for name, one in ratios if name not in noise or one > most), default=1.0)
+
+
+def _faster_than_motion(fit: Fit) -> bool:
+    """True if most of what is left of the second encoder is faster than the axis moves: it cannot go with the motion.
+
+    Of a slower remainder too few values are independent to tell noise from an error that the motion repeats.
+    """
+    plain = fit_plain(fit.data)
+    parts = left_in_channel(fit.hypothesis, fit.data, DIFFERENCE, plain) if plain else []
+    slow = total = 0.0
+    for run, part in zip(fit.data.runs, parts, strict=False):
+        moved = np.cumsum(np.abs(np.fft.rfft(intended_motion(run).velocity)) ** 2)
+        left = np.where(part.rows, part.left, 0.0)
+        energy = np.abs(np.fft.rfft(left - left[part.rows].mean() * part.rows)) ** 2 if part.rows.any() else np.zeros(1)
+        slow += float(energy[: np.searchsorted(moved, _MOTION * moved[-1]) + 1].sum())
+        total += float(energy.sum())
+    return slow < 0.5 * total
 
 
 def behind_plain(judged: Judged) -> bool:

@@ -14,6 +14,7 @@ from hil.importing.map_file import RecordingMap
 from hil.recording.recording import read_recording
 
 LOAD, TURNING, MOTOR = Constant.LOAD_MASS, Constant.LOAD_INERTIA, Constant.MOTOR_INERTIA
+SPRING, TORSION = Constant.STIFFNESS, Constant.TORSION
 
 
 @pytest.mark.parametrize(
@@ -27,6 +28,9 @@ LOAD, TURNING, MOTOR = Constant.LOAD_MASS, Constant.LOAD_INERTIA, Constant.MOTOR
         ("Payload + platform 0.93 kgm2; motor with first stage 4.2e-5 kg m^2", {TURNING: 0.93, MOTOR: 4.2e-5}),
         ("Moved mass: about 37 kg (carriage with vacuum frame)", {LOAD: 37.0}),
         ("La table pese 80 kg", {LOAD: 80.0}),
+        ("axial stiffness screw + nut + bearings, by the maker: 140 N/um", {SPRING: 140e6}),
+        ("- gear data sheet: torsional stiffness at the output 1.6e6 Nm/rad, no backlash", {TORSION: 1.6e6}),
+        ("Drehsteifigkeit 19 Nm/arcmin", {TORSION: 19.0 * 3437.746770784939}),
     ],
 )
 def test_the_word_nearest_to_the_number_tells_whose_it_is(line: str, told: dict[Constant, float]) -> None:
@@ -64,10 +68,13 @@ def test_the_word_nearest_to_the_number_tells_whose_it_is(line: str, told: dict[
         "Table mass 1,200 kg",
         "Tischmasse 1.200,5 kg",
         "table 0 kg",
+        "coupling stiffness 4000 Nm/rad",
+        "bellows: stiffness 2 N/mm, contact at 6.8 mm",
+        "stiffness of the belt: don't know",
     ],
 )
 def test_a_sum_a_limit_and_another_quantity_tell_nothing(line: str) -> None:
-    found = {LOAD, TURNING, MOTOR} & set(header_values([line], {}))
+    found = {LOAD, TURNING, MOTOR, SPRING, TORSION} & set(header_values([line], {}))
     assert not found
 
 

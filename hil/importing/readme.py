@@ -16,6 +16,7 @@ from hil.importing.listed_scales import is_raw, is_whole
 from hil.importing.readme_columns import WHOLES, ToldColumn, told_columns
 from hil.importing.unit_lines import described
 from hil.importing.units import QUANTITY_OF_UNIT, unit_named
+from hil.importing.wheel_told import travel_told
 
 # Counts of an encoder, 2^21; not within a sum or a product.
 _POWER = re.compile(r"(?<![\w.,*/^+-])2 ?(?:\^|\*\*) ?(\d{1,2})(?![\w.,]?\d|\s*[-+*/]\s*\d)")
@@ -70,6 +71,8 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     if parts := _last_parts(titles):
         told = {parts[part]: one for part, one in told_columns(lines, list(parts)).items()} | told
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
+    if lead := travel_told(lines, constants.get(Constant.LEAD)):
+        constants[Constant.LEAD] = lead
     if motor := _motor_encoder(told):  # each encoder has its own counts
         constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
         told = {name: _as_angle(table, name, one) if name != motor else one for name, one in told.items()}

@@ -78,3 +78,21 @@ def test_a_twin_beside_an_encoder_that_wanders_alone_lacks_nothing(tmp_path: Pat
     base = fit_nominal_parameters(prepared.train)
     assert base.noise_ratios[0]["table"] > 25.0
     assert accepted(reproduction(base, prepared.held_out))
+
+
+@pytest.mark.parametrize("turns", [2.2, 0.7])
+def test_an_error_as_slow_as_the_motion_is_no_noise(turns: float, tmp_path: Path) -> None:
+    """A wheel off centre behind an unknown gear: of so slow a remainder too few values are independent."""
+    columns = axis(ROWS)
+    angle = columns["angle"]
+    place_m = LEAD_M / (2.0 * np.pi) * angle + 20e-6 * np.sin(2.0 * np.pi * turns * angle / np.ptp(angle))
+    table = {"time_s": columns["t"], "motor_angle_rad": angle, "torque_Nm": columns["torque"]}
+    table["scale_mm"] = np.round(1e3 * place_m / 1e-4) * 1e-4
+    import_(write(tmp_path / "log.csv", table), None, tmp_path / "log.parquet", None, None)
+    identify([tmp_path / "log.parquet"], tmp_path / "axis.yaml")
+    prepared = prepare([read_recording(tmp_path / "log.parquet")], [], load_bench(tmp_path / "axis.yaml"))
+    base = fit_nominal_parameters(prepared.train)
+    assert not accepted(reproduction(base, prepared.held_out))
+    if turns > 2.0:
+        left = structure_left(base, prepared.held_out)
+        assert any("place within its period" in one.question.name for one in left if one.channel == "difference")

@@ -282,3 +282,15 @@ def test_a_plain_unit_goes_before_ratios_of_something_else(line: str) -> None:
 )
 def test_sentences_do_not_hide_lists(line: str, units: dict[str, str]) -> None:
     assert {name: one.unit for name, one in told_columns([line], list(units)).items()} == units
+
+
+@pytest.mark.parametrize("counts", ["3 600 000 inc per table revolution", "3600000 increments / table turn"])
+def test_counts_of_a_turn_of_the_load_may_be_told_beside_the_column(counts: str, tmp_path: Path) -> None:
+    turned = AXIS["angle"] / 90.0
+    columns = {"time_s": AXIS["t"], "motor_inc": np.round(AXIS["angle"] / (2.0 * np.pi) * 8192)}
+    columns |= {"table_inc": np.round(turned / (2.0 * np.pi) * 3.6e6) + 1184453, "torque_Nm": AXIS["torque"]}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(f"- motor encoder 8192 inc/rev\n- ring encoder, {counts}\n- worm 90:1\n")
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")["table_position_m"]
+    np.testing.assert_allclose(found - found[0], turned - turned[0], atol=2e-6)

@@ -1,0 +1,34 @@
+"""Internal steps of the twin are as fine as the noise of the recordings asks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from diagnosis_runs import bench, dataset, evaluated, recorded
+
+from hil.identification.hypothesis import Hypothesis
+from hil.identification.internal_steps import longest_steps
+from hil.identification.measured import take
+from hil.twin.axis import TWIN_STEPS, Steps
+
+
+def steps(torque_noise_n_m: float) -> tuple[Steps, float]:
+    """Longest steps on a recording with a noise of the torque, and what they change of the residuals [noise^2]."""
+    data = dataset([take(recorded(bench(), torque_noise_n_m=torque_noise_n_m), bench())], bench())
+    fit = evaluated(Hypothesis(bench()), data)
+    found = longest_steps(fit)
+    longer = replace(fit.estimator, data=replace(data, steps=found)).residuals(fit.hypothesis)
+    changed = longer.vector - fit.residuals.vector
+    return found, float(changed @ changed)
+
+
+@pytest.mark.parametrize("torque_noise_n_m", [1e-4, 0.01, 1.0])
+def test_they_change_less_than_evidence(torque_noise_n_m: float) -> None:
+    assert steps(torque_noise_n_m)[1] <= 2.0
+
+
+def test_more_noise_allows_longer_ones() -> None:
+    (fine, _), (coarse, _) = steps(1e-4), steps(1.0)
+    assert fine.coarse_s < coarse.coarse_s
+    assert coarse.fine_s > TWIN_STEPS.fine_s

@@ -26,9 +26,11 @@ _BLANKS = re.compile(
     r"(?=\s+(?:inc|ink|counts?\b|cnts?\b|pulses|impuls|steps|lines|cts\b|nm/rad))",
     re.IGNORECASE,
 )
+_LOAD = "table|output|load|plate|joint|tisch(?:es)?|abtriebs?|last|gelenks?"
 _PER_LOAD_TURN = re.compile(  # 3600000 inc per table revolution
     r"(?<![\w.,])(\d+)\s+(\w+)(?: ?/ ?| (?:per|pro|je|par) )"
-    r"(?:table|output|load|plate|joint|tisch|abtriebs?|last|gelenk)[ -]?(?:turn|rev|umdr|tour)",
+    rf"(?:(?:{_LOAD})[ -]?(?:turn|rev|umdr|tour)"
+    rf"|(?:turn|rev\w*|umdr\w*|tour) (?:of|des|der|de) (?:the )?(?:{_LOAD})\b)",
     re.IGNORECASE,
 )
 _LONGEST = 1_000_000  # bytes: no README is as long
@@ -68,14 +70,18 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     listed = {title: ToldColumn(*one) for title, one in described(lines, list(titles)).items()}
     told = {titles[title]: one for title, one in (told_columns(lines, list(titles)) | listed).items()}
     told = _of_load(table, lines) | _by_number(lines, list(table.columns)) | told
+    several = _by_placeholder(titles)
+    of_several = told_columns(lines, list(several)) if several else {}
+    told = {name: one for alias, one in of_several.items() for name in several[alias]} | told
     if parts := _last_parts(titles):
         told = {parts[part]: one for part, one in told_columns(lines, list(parts)).items()} | told
     told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
     if lead := travel_told(lines, constants.get(Constant.LEAD)):
         constants[Constant.LEAD] = lead
-    if motor := _motor_encoder(told):  # each encoder has its own counts
-        constants[Constant.COUNTS] = HeaderValue(float(told[motor].per_turn or 0), f"{motor}: {told[motor].words}")
-        told = {name: _as_angle(table, name, one) if name != motor else one for name, one in told.items()}
+    if motors := _motor_encoders(told):  # each encoder has its own counts
+        of_motor = told[motors[0]]
+        constants[Constant.COUNTS] = HeaderValue(float(of_motor.per_turn or 0), f"{motors[0]}: {of_motor.words}")
+        told = {name: _as_angle(table, name, one) if name not in motors else one for name, one in told.items()}
     firm = {name: one.unit for name, one in told.items() if one.step and _is_firm(table, name, one)}
     units = {n: unit for n, unit in table.units.items() if n not in firm and (n not in told or unit_named(unit))}
     steps = {name: one.step for name, one in told.items() if one.step and (name in firm or name not in units)}
@@ -113,6 +119,15 @@ def _by_number(lines: list[str], columns: list[str]) -> dict[str, ToldColumn]:
     return {names[number]: one for number, one in told.items()} if len(told) == len(columns) else {}
 
 
+def _by_placeholder(titles: Mapping[str, str]) -> dict[str, list[str]]:
+    """Columns by a name that a text may give to several: runX_i for runA_i and runB_i."""
+    found = dict[str, list[str]]()
+    for title, name in titles.items():
+        for match in re.finditer(r"(?<=[a-z_])[A-Z\d](?=_|$)|(?<=[a-z])[A-Z](?=[A-Z])", title):
+            found.setdefault(f"{title[: match.start()]}X{title[match.end() :]}", []).append(name)
+    return {alias: names for alias, names in found.items() if len(names) > 1 and alias not in titles}
+
+
 def _last_parts(titles: Mapping[str, str]) -> dict[str, str]:
     """Columns by the last part of a title with points, if one has it: enc of log.enc, as its owner calls it."""
     last = [(title.rpartition(".")[2], name) for title, name in titles.items() if "." in title]
@@ -124,10 +139,10 @@ def _last_parts(titles: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def _motor_encoder(told: Mapping[str, ToldColumn]) -> str:
-    """The column of the motor's encoder, if counts per turn are told of one; "" else."""
+def _motor_encoders(told: Mapping[str, ToldColumn]) -> list[str]:
+    """The columns of the motor's encoder, one in each part of a file, if counts per turn are told of it."""
     motors = [name for name, one in told.items() if one.per_turn and label(name, "", one.words).motor]
-    return motors[0] if len(motors) == 1 else ""
+    return motors if len({(told[name].per_turn, told[name].words) for name in motors}) == 1 else []
 
 
 def _as_angle(table: ForeignTable, name: str, told: ToldColumn) -> ToldColumn:

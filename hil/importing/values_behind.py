@@ -12,7 +12,9 @@ _PER_TURN = re.compile(
     r"(?! of| der| des|/)"
 )
 _OF_COUNTS = re.compile(r"encoder|resolver|increment|inkrement|geber|codeur")
-_NO_COUNTS = re.compile(r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho|quadratur\w*|x ?4)\b")
+_NO_COUNTS = re.compile(
+    r"\b(cogging|ripple|poles?|hall|stepp\w*|gear\w*|getriebe|tacho|quadratur\w*|(?<!after )x ?4)\b"
+)
 _PER_SECOND = re.compile(r"^ *(samples|rows|lines) ?(?:per|/) ?s(?:ec|\b)")
 _PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) (?:per (?:line|row)|apart)\b")
 _LOGGED_AT = re.compile(

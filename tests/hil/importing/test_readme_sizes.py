@@ -9,6 +9,7 @@ import pytest
 import yaml
 from foreign_axis import axis, write
 
+from hil.arrays import FloatArray
 from hil.commands.import_ import import_
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
@@ -294,3 +295,22 @@ def test_counts_of_a_turn_of_the_load_may_be_told_beside_the_column(counts: str,
     import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
     found = read_recording(tmp_path / "out.parquet")["table_position_m"]
     np.testing.assert_allclose(found - found[0], turned - turned[0], atol=2e-6)
+
+
+def test_a_text_may_give_one_name_to_the_columns_of_several_runs(tmp_path: Path) -> None:
+    columns = dict[str, FloatArray]()
+    for run in "AB":
+        columns |= {f"run{run}_t": AXIS["t"], f"run{run}_mot_inc": np.round(AXIS["angle"] / (2.0 * np.pi) * 8192)}
+        columns |= {f"run{run}_joint_inc": np.round(AXIS["angle"] / 101.0 / (2.0 * np.pi) * 2**20)}
+        columns |= {f"run{run}_i_A": np.round(AXIS["torque"] / 0.0905, 3)}
+    path = write(tmp_path / "log.csv", columns)
+    (tmp_path / "README.md").write_text(
+        "    runX_t          s\n"
+        "    runX_mot_inc    motor encoder, 8192 increments per motor revolution (after x4)\n"
+        "    runX_joint_inc  output encoder, 2^20 increments per revolution of the joint\n"
+        "    runX_i_A        current, A\n\n    torque constant 0.0905 Nm/A\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    found = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(found["motor_position_rad"], AXIS["angle"], atol=4e-4)
+    np.testing.assert_allclose(np.ptp(found["table_position_m"]), np.ptp(AXIS["angle"]) / 101.0, rtol=1e-3)

@@ -15,7 +15,7 @@ from hil.quantities import digits
 
 _MA_PER_RPM = 1e-3 * 60.0 / (2.0 * math.pi)  # mA/rpm in A s/rad
 UNKNOWN = "unknown"
-MOST_TORQUE_DELAY_S = 0.5  # either way: a row and a half of 300 ms
+MOST_TORQUE_DELAY_S = 0.5  # either way: a mean over a row of 300 ms, and the filter of a current
 
 # a period in milliseconds is refused
 Period = Annotated[float, Field(gt=0.0, le=0.1, allow_inf_nan=False, description="period of the loop [s]")]

@@ -56,7 +56,7 @@ _DEVIATES = re.compile(
 )
 _SENTENCES = re.compile(r"(?<!\bca)(?<!\bapprox)(?<!\babt)[.;!?](?:\s(?!\s)|$)")  # two blanks: a column
 _GROUPED = re.compile(r"\d{1,3}(?:[.,]\d{3})+(?:[.,]\d+)?")  # 1,200 is 1200 or 1.2
-_THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+")  # or a decimal comma
+_THOUSANDS = re.compile(r"\d{1,3}(,\d{3})+|[1-9]\d{0,2}(\.000)+")  # or a decimal comma, or point
 _OF_MACHINES, _LONGEST_CYCLE_S = ("cycle", "zyklus"), 0.1  # a machine has cycles too, of seconds
 _MOST_BITS = 40.0  # of an encoder
 _SYMBOL = 3  # most letters of a symbol such as J or kt, which also has other meanings
@@ -80,15 +80,14 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
         words, unit = _unit_of_name(name)
         given.append(Statement(words, scalar, (unit,), f"{name} = {scalar:g}", words))
     # what is said of the motor goes before what words say, and that before what a unit alone says
-    found: dict[Constant, dict[tuple[bool, bool], list[HeaderValue]]] = {}
+    found: dict[Constant, dict[tuple[bool, ...], list[HeaderValue]]] = {}
     for one in given:
-        if part := nominal_told(one):
-            found.setdefault(part[0], {}).setdefault((False, True), []).append(HeaderValue(part[1], one.text))
-            continue
         units = one.units if any(one.units) else (*one.units, None)
-        if told := next((known for unit in units if (known := _constant(one, unit))), None):
+        if part := nominal_told(one):
+            found.setdefault(part[0], {}).setdefault((False, True, True), []).append(HeaderValue(part[1], one.text))
+        elif told := next((known for unit in units if (known := _constant(one, unit))), None):
             by_words, constant, value = told
-            rank = one.of_motor, by_words and not one.weak
+            rank = one.of_motor, by_words and not one.weak, not one.alone
             found.setdefault(constant, {}).setdefault(rank, []).append(HeaderValue(value, one.text))
     best = {constant: ranked[max(ranked)] for constant, ranked in found.items()}
     return {constant: values[0] for constant, values in best.items() if len({one.value for one in values}) == 1}
@@ -97,6 +96,8 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
 def _statements(line: str) -> Iterator[Statement]:
     """Statements of a line; numbers that follow the first one without words are those of other channels."""
     folded = _NO_VALUE.sub(" ", _folded(line.strip().strip('"#%/ ')))
+    if count := size_of_count(folded, header_text(line)):
+        yield count
     if turn := _TURN_IS.match(folded):
         size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
         yield from [Statement("", size, (unit,), line.strip())] if size is not None else []
@@ -106,7 +107,6 @@ def _statements(line: str) -> Iterator[Statement]:
         yield from (Statement(f"rated {of}", size, units, header_text(line)) for of in ("torque", "force", "current"))
         if whole["size"]:  # the rest of the line says of which
             return
-    yield from filter(None, [size_of_count(folded, header_text(line))])
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
         before = folded[matches[index - 1].end() if index else 0 : match.start()]

@@ -120,7 +120,8 @@ class ConstantWords(_Entry):
 class MassWords(_Entry):
     """Words of what a mass or an inertia is of, and of one that is not of the load, or not of the motor, alone.
 
-    And the words of a stiffness, and of one that is not that of the whole transmission.
+    And the words of a stiffness, of one that is not that of the transmission, of parts of it, of which one alone tells
+    nothing, and of a limit or a wish.
     """
 
     load: Words
@@ -128,6 +129,8 @@ class MassWords(_Entry):
     neither: Words
     stiffness: Words
     other_stiffness: Words
+    parts: Words
+    limits: Words
     mass_units: dict[str, PositiveFloat]
     inertia_units: dict[str, PositiveFloat]
     stiffness_units: dict[str, PositiveFloat]

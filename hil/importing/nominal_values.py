@@ -13,6 +13,7 @@ from hil.importing.values_behind import Statement
 _SHORT = 4  # letters: a longer word may have another ending
 _INERTIA = re.compile(r"inertia|tragheitsmoment|inertie|inerzia|inercia")
 _OF_LINE = re.compile(rf"^(?:\w+ )?(?:{_INERTIA.pattern})(?: about the axis)?$")
+_SENTENCE = re.compile(r"(?<!\bmin)(?<!\bmax)(?<!\bca)[.;]\s")
 _GOES_ON = re.compile(r"k?g[cm]?m|kg(?:\+|plus).*")  # kg m, kg plus others
 
 
@@ -23,9 +24,13 @@ def nominal_told(told: Statement) -> tuple[Constant, float] | None:
 
 def _stiffness_told(told: Statement) -> tuple[Constant, float] | None:
     """Stiffness of the whole transmission; that of a part, or of a stop, tells nothing."""
-    known, words = lexicon().masses, told.sentence.split()
-    says = any(_is_one_of(word, known.stiffness) for word in words)
-    if not says or any(_is_one_of(word, known.other_stiffness) for word in words) or not told.number > 0.0:
+    known = lexicon().masses
+    says = any(_is_one_of(word, known.stiffness) for word in told.sentence.split())
+    sentences = (re.findall(r"[^\W\d_]+", one) for one in _SENTENCE.split(without_accents(told.text).lower()))
+    words = next((one for one in sentences if any(_is_one_of(word, known.stiffness) for word in one)), [])
+    of_others = any(_is_one_of(word, (*known.other_stiffness, *known.limits)) for word in words)
+    of_part = sum(any(_is_one_of(word, (one,)) for word in words) for one in known.parts) == 1
+    if not says or of_others or of_part or told.grouped or ">" in told.text or not told.number > 0.0:
         return None
     kinds = ((Constant.STIFFNESS, known.stiffness_units), (Constant.TORSION, known.torsion_units))
     return next(((kind, units[one] * told.number) for one in told.units for kind, units in kinds if one in units), None)

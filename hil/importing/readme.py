@@ -22,10 +22,12 @@ from hil.importing.wheel_told import travel_told
 _POWER = re.compile(r"(?<![\w.,*/^+-])2 ?(?:\^|\*\*) ?(\d{1,2})(?![\w.,]?\d|\s*[-+*/]\s*\d)")
 # Blanks between thousands: 3 600 000 inc per table revolution, 22 000 Nm/rad.
 _BLANKS = re.compile(
-    r"(?<![\w.,])\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+"
+    r"(?<![\w.,])(?<!\d )(?<!no\. )(?<!axis )(?<!encoder )(?<!run )(?<!leg )(?<!columns: )"
+    r"[1-9]\d{0,2}(?:[ \u00a0\u2009\u202f]\d{3})+"
     r"(?=\s+(?:inc|ink|counts?\b|cnts?\b|pulses|impuls|steps|lines|cts\b|nm/rad))",
     re.IGNORECASE,
 )
+_NO_ENCODER = re.compile(r"\b(?:error|deviation|accuracy|ripple|fehler|abweichung|x ?4|quadratur\w*)\b", re.IGNORECASE)
 _LOAD = "table|output|load|plate|joint|tisch(?:es)?|abtriebs?|last|gelenks?"
 _PER_LOAD_TURN = re.compile(  # 3600000 inc per table revolution
     r"(?<![\w.,])(\d+)\s+(\w+)(?: ?/ ?| (?:per|pro|je|par) )"
@@ -106,7 +108,8 @@ def _of_load(table: ForeignTable, lines: list[str]) -> dict[str, ToldColumn]:
     labels = {name: label(table.titles.get(name, name)) for name in table.columns}
     loads = [name for name, one in labels.items() if one.table and not one.command and is_whole(table.columns[name])]
     counted = [name for name in loads if _own_unit(table, name) in (None, "counts")]
-    found = {float(one[1]) for line in lines for one in _PER_LOAD_TURN.finditer(line) if unit_named(one[2]) == "counts"}
+    told = [one for line in lines if not _NO_ENCODER.search(line) for one in _PER_LOAD_TURN.finditer(line)]
+    found = {float(one[1]) for one in told if unit_named(one[2]) == "counts"}
     if len(counted) != 1 or len(found) != 1 or 0.0 in found:
         return {}
     return {counted[0]: ToldColumn("", "deg", 360.0 / found.pop())}

@@ -7,7 +7,7 @@ that are no longer needed are removed: a first term may have imitated two causes
 import math
 import time
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -107,7 +107,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     step("refitting the nominal parameters")
     base = fit_nominal_parameters(prepared.train, deadline_s=deadline_s)
     require_finite(base)
-    prepared = prepared.with_steps(longest_steps(base))
+    prepared = prepared.with_steps(longest_steps(base, prepared.held_out))
     base = carried(prepared.train, base)
     given, nominal = base.estimator.evaluate(base.hypothesis.given), base
     begun = given, nominal
@@ -153,6 +153,7 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
             nominal = base  # the term has only led the nominal parameters out of a local minimum
             continue
         tried.append(effects(base.terms))
+        base, nominal, given, prepared = _with_finer_steps(base, nominal, given, prepared)
         if len(base.terms) >= CRITERIA.in_vain and mismatch_left(nominal, base, base.data) > CRITERIA.most_left:
             if not (beside := _beside_unexplained(base, nominal, given)):
                 break
@@ -161,12 +162,24 @@ def search(prepared: Prepared, progress: Progress = lambda text: None, deadline_
     base, needed, rivals = found.fit, found.needed, found.rivals
     step("fitting the explanation to convergence")
     final = ended(again(revised(base).refit(ENDED), ENDED))
+    final, _, _, prepared = _with_finer_steps(final, nominal, given, prepared)
+    if begun[0].data.steps != prepared.train.steps:
+        begun = carried(prepared.train, begun[0]), carried(prepared.train, begun[1])
     kept = {term.key for term in final.terms}
     present = {*fitted, *(term.effect for term in final.terms)}
     not_tried = tuple(one.id for one in LIBRARY if one.id not in present) if stopped_at else ()
     rivals = {key: value for key, value in rivals.items() if key in kept}
     given, nominal, final = (fit.without_deadline() for fit in (*begun, final))
     return Searched(prepared, given, nominal, final, rivals, needed, tuple(considered), stopped_at, not_tried)
+
+
+def _with_finer_steps(base: Fit, nominal: Fit, given: Fit, prepared: Prepared) -> tuple[Fit, Fit, Fit, Prepared]:
+    """The fits with internal steps as fine as the terms of the base ask: a nut in a gap asks for finer ones."""
+    steps = longest_steps(base, prepared.held_out)
+    if steps.fine_s >= base.data.steps.fine_s:
+        return base, nominal, given, prepared
+    data = replace(base.data, steps=steps)
+    return over(data, base), carried(data, nominal), carried(data, given), prepared.with_steps(steps)
 
 
 def _best(last: _Explanation, others: Sequence[_Explanation]) -> _Explanation:

@@ -16,7 +16,7 @@ from hil.identification.inference import standard_errors
 from hil.identification.least_squares import SIGMAS
 from hil.identification.terms import Term
 from hil.identification.torque_left import fit_plain, left_by_twin
-from hil.quantities import quantity, unit_of
+from hil.quantities import digits, quantity, unit_of
 from hil.twin.library import BY_ID
 
 _DATA_SHEET = 0.3  # of a stiffness: those of catalogues are of parts, and of a nut without its load
@@ -37,9 +37,7 @@ def in_bench(
             continue
         if getattr(axis, name) > SIGMAS * errors.get(name, np.inf) and name not in final.at_bound:
             spring, unit = getattr(axis, name), unit_of(name)
-            departs = (
-                f" ({text})" if (text := _as_told(spring, errors.get(name, 0.0), (owner or {}).get(name), unit)) else ""
-            )
+            departs = _as_told(spring, errors.get(name, 0.0), (owner or {}).get(name), unit)
             told.append(f"A spring of {quantity(spring, unit)} in the transmission{departs}.")
     delay_s = hypothesis.resolved.bench.torque_delay_s
     acts_s = (delay_s or 0.0) + 0.5 * final.bench.period_s  # the twin holds each value for a row
@@ -65,10 +63,10 @@ def in_bench(
 
 
 def _as_told(value: float, error: float, owner: float | None, unit: str) -> str:
-    """By how much a value departs from what the owner tells, in words; empty within its errors and those of parts."""
+    """Which share a value is of what the owner tells, in words; empty within its errors and those of data sheets."""
     if owner is None or abs(value - owner) <= max(SIGMAS * error, _DATA_SHEET * owner):
         return ""
-    return f"{value / owner - 1.0:+.0%} against the {quantity(owner, unit)} that its owner tells".replace("%", " %")
+    return f", {digits(100.0 * value / owner, 2)} % of the {quantity(owner, unit)} that the owner of the axis tells"
 
 
 def _before(kept: MechanismEntry, final: Fit, error: float) -> str:

@@ -30,6 +30,7 @@ SPRING, TORSION = Constant.STIFFNESS, Constant.TORSION
         ("La table pese 80 kg", {LOAD: 80.0}),
         ("axial stiffness screw + nut + bearings, by the maker: 140 N/um", {SPRING: 140e6}),
         ("- gear data sheet: torsional stiffness at the output 1.6e6 Nm/rad, no backlash", {TORSION: 1.6e6}),
+        ("Gesamtsteifigkeit 56 N/um", {SPRING: 56e6}),
         ("Drehsteifigkeit 19 Nm/arcmin", {TORSION: 19.0 * 3437.746770784939}),
     ],
 )
@@ -71,6 +72,10 @@ def test_the_word_nearest_to_the_number_tells_whose_it_is(line: str, told: dict[
         "coupling stiffness 4000 Nm/rad",
         "bellows: stiffness 2 N/mm, contact at 6.8 mm",
         "stiffness of the belt: don't know",
+        "Stiffness: 56,000 N/m",
+        "min. stiffness 100 N/um",
+        "Stiffness of the nut 400 N/um",
+        "Cable chain: force 20 N, stiffness 40 N/m",
     ],
 )
 def test_a_sum_a_limit_and_another_quantity_tell_nothing(line: str) -> None:

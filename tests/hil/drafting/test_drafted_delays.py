@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from foreign_axis import axis
 
+from hil.bench.control_section import MOST_TORQUE_DELAY_S
 from hil.drafting.drafted_bench import DraftedBench, drafted
 from hil.quantities import digits
 from hil.recording.recording import Recording
@@ -47,5 +48,6 @@ def test_slow_rows_with_a_late_torque_make_a_valid_bench(late_rows: int) -> None
     acceleration = -1.764 * np.sin(0.21 * time_s) - 4.2135 * np.sin(0.53 * time_s)
     torque = np.roll(0.2 * acceleration + 0.02 * speed + 0.4 * np.sign(speed), late_rows)
     torque += 0.002 * np.random.default_rng(4).normal(size=torque.size)
-    bench = imported(0.3, angle, torque).bench  # a delay beyond what a bench takes would be refused
-    assert bench.torque_delay_s is None or abs(bench.torque_delay_s) <= 0.2
+    delay_s = imported(0.3, angle, torque).bench.torque_delay_s  # beyond what a bench takes it would be refused
+    expected_s = -0.3 * (late_rows + 0.5)  # samples of one instant act half a row before they are held
+    assert delay_s == (pytest.approx(expected_s, abs=0.01) if abs(expected_s) < MOST_TORQUE_DELAY_S else None)

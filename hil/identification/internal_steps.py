@@ -6,6 +6,7 @@ in them.
 
 from dataclasses import replace
 
+from hil.arrays import FloatArray
 from hil.identification.dataset import SEARCH_STEPS, Dataset
 from hil.identification.estimator import Fit
 from hil.twin.axis import TWIN_STEPS, Steps
@@ -19,18 +20,15 @@ def longest_steps(fit: Fit, held_out: Dataset) -> Steps:
 
     Against those of the twin's own steps, on the recordings of the fit and on held-out ones, as far as there are any.
     """
-    found = TWIN_STEPS
+    found, own = TWIN_STEPS, [(data, _left(fit, data, TWIN_STEPS)) for data in (fit.data, held_out) if data.runs]
     for steps in _LONGER:
-        if not all(_change(fit, data, steps) <= _UNSEEN for data in (fit.data, held_out) if data.runs):
+        changes = (_left(fit, data, steps) - left for data, left in own)
+        if not all(float(change @ change) <= _UNSEEN for change in changes):  # NaN where the twin is unstable
             break
         found = steps
     return found
 
 
-def _change(fit: Fit, data: Dataset, steps: Steps) -> float:
-    """Energy of the change of all weighted residuals [noise^2]; NaN where the twin is unstable."""
-    own, longer = (
-        replace(fit.estimator, data=replace(data, steps=each)).residuals(fit.hypothesis).vector
-        for each in (TWIN_STEPS, steps)
-    )
-    return float((longer - own) @ (longer - own))
+def _left(fit: Fit, data: Dataset, steps: Steps) -> FloatArray:
+    """Weighted residuals (m,) of the hypothesis of a fit on recordings with other steps."""
+    return replace(fit.estimator, data=replace(data, steps=steps)).residuals(fit.hypothesis).vector

@@ -177,7 +177,7 @@ class ChannelSource(_Strict):
 
 
 class NominalValues(_Strict):
-    """What the owner tells of the parts of an axis; of the masses a recording tells the sum alone."""
+    """Values that the owner gives for the parts of an axis. A recording shows only the sum of the masses."""
 
     load_mass_kg: PositiveFloat | None = Field(default=None, description="of a load that slides [kg]")
     load_inertia_kg_m2: PositiveFloat | None = Field(

@@ -116,7 +116,7 @@ def _of_load(table: ForeignTable, lines: list[str]) -> dict[str, ToldColumn]:
 
 
 def _by_number(lines: list[str], columns: list[str]) -> dict[str, ToldColumn]:
-    """What a list that numbers all columns says of each, by its name."""
+    """What a numbered list says of the columns, by their names; empty if it has not all of them."""
     names = {f"column {number}": name for number, name in enumerate(columns, 1)}
     told = told_columns(lines, list(names)) if columns[0] not in names else {}
     return {names[number]: one for number, one in told.items()} if len(told) == len(columns) else {}

@@ -60,7 +60,7 @@ def _worst(fit: Fit, noise: Collection[str], most: float) -> float:
 
 
 def _faster_than_motion(fit: Fit) -> bool:
-    """True if most of what is left of the second encoder has higher frequencies than the motion: that does not cause it.
+    """True if what is left of the second encoder has mostly higher frequencies than the motion: that does not cause it.
 
     Of a slower remainder too few values are independent to tell noise from an error that the motion repeats.
     """

@@ -36,7 +36,8 @@ from hil.identification.derivatives import (
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
 from hil.identification.parallel import one_blas_thread
 from hil.identification.torque_lag import shift_of_torque
-from hil.identification.windows import position_noise, quiet_window
+from hil.identification.whitening import RANK
+from hil.identification.windows import LONGEST_S, NOISE_SHARE, position_noise, quiet_window
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
 LEAST_ANGLE_RAD = 0.5  # of the load: over less, a sine is a straight line to 1 %, and gravity is a spring
@@ -47,6 +48,7 @@ _LAW = ("slow", "fast")  # coefficients of a friction that bends at low and at h
 _BEND = 0.1  # of the top speed: range of speed in which a friction that falls from rest is felt
 _FARTHEST_ROWS, _FARTHEST_S = 8, 0.04  # lateness of a torque that is sought; the larger of both
 _KEPT = 0.5  # of the sliding rows, at least: others tell the accelerations
+_LESS = 0.5  # of the torque that a window of half the rows leaves: white noise of the torque falls to 0.7
 _LOGGED = "logged"  # coefficient of the time of the torque's rows against those of the position
 
 
@@ -101,13 +103,39 @@ class MotionData:
 def motion_data(position: FloatArray, torque: FloatArray, period_s: float, judged: slice = slice(None)) -> MotionData:
     """Data of motor position and torque (n,), of the rows `judged` without half a window at both ends."""
     noise, rms = position_noise(position)
-    window = quiet_window(position, rms, period_s)
+    window = _quiet_beside(torque, position, period_s, quiet_window(position, rms, period_s))
     rows, half = np.zeros(position.size, dtype=bool), window // 2 + 1
     rows[judged] = True
     rows[:half] = rows[-half:] = False
     return MotionData(
         matched_motion(position, period_s, window), matched(torque, window), rows, period_s, window, noise
     )
+
+
+def _quiet_beside(torque: FloatArray, position: FloatArray, period_s: float, window: int) -> int:
+    """Rows of the window, `window` or longer, in which the acceleration has little that the torque has not.
+
+    Noise that is not white, as that of uneven stamps, leaves more of it than white noise does. It is what the next
+    window takes from the acceleration and not from the torque, and the model then leaves less of the torque.
+    """
+
+    def fitted(rows: int) -> tuple[FloatArray, FloatArray, float, float]:
+        moved = matched_motion(position, period_s, rows)
+        table = np.column_stack([one[longest:-longest] for one in plain_columns(moved).values()])
+        wanted = matched(torque, rows)[longest:-longest]
+        values = np.linalg.lstsq(table, wanted, rcond=RANK)[0]
+        return table[:, 0], wanted, float(values[0]), float(np.std(wanted - table @ values))
+
+    longest = min(position.size // 4, round(LONGEST_S / period_s))
+    own = fitted(window) if 2 * window - 1 <= longest else None
+    while own and 2 * window - 1 <= longest:
+        longer = fitted(2 * window - 1)
+        bend, effort = longer[2] * (own[0] - longer[0]), own[1] - longer[1]
+        noise = float(np.var(bend)) - float(np.cov(bend, effort)[0, 1])
+        if noise <= NOISE_SHARE * float(np.var(longer[2] * own[0])) or longer[3] > _LESS * own[3]:
+            break
+        own, window = longer, 2 * window - 1
+    return window
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from scipy.special import ndtri
 from hil.arrays import FloatArray
 from hil.identification.derivatives import SMOOTH_S, MeasuredMotion, matched_motion, noise_gains
 
-_NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes the inertia too small by this share
+NOISE_SHARE = 0.02  # of noise in the variance of the acceleration: it makes the inertia too small by this share
 LONGEST_S = 0.35  # window of the derivatives: passes 2 Hz
 
 
@@ -37,7 +37,7 @@ def quiet_window(
         share = (noise * gain) ** 2 / max(min(float(np.var(acceleration)), (beside * passed) ** 2), 1e-300)
         if share < least:
             best, least = window, share
-        if share < _NOISE_SHARE:
+        if share < NOISE_SHARE:
             break
         window = 2 * window - 1
     return best

@@ -22,6 +22,7 @@ from hil.identification.plain_model import (
     motion_data,
     plain_columns,
 )
+from hil.identification.windows import position_noise, quiet_window
 
 PERIOD_S = 1e-3
 TIME = np.arange(8000) * PERIOD_S
@@ -290,3 +291,27 @@ def test_noise_about_rest_is_no_way_back() -> None:
     position = np.cumsum(speed) * PERIOD_S + 1e-5 * np.random.default_rng(4).standard_normal(speed.size)
     model = fitted(position, torque_of(np.cumsum(speed) * PERIOD_S))
     assert not np.isfinite(model["coulomb"].std_error)
+
+
+@pytest.mark.parametrize("correlated", [0.6, 0.8])
+def test_a_window_is_as_long_as_correlated_noise_of_the_stamps_asks(correlated: float) -> None:
+    """Rows are read up to 100 us (rms) off, some in turn alike: fast rows show less noise than the acceleration has."""
+    rng, rows, period_s, turns = np.random.default_rng(3), 12_000, 1e-3, 2.0 * np.pi * 2.0
+    late_s = lfilter([1.0], [1.0, -correlated], rng.standard_normal(rows))
+    time_s = np.arange(rows) * period_s
+    motor = 12.7 * np.sin(turns * (time_s + 1e-4 * late_s / late_s.std()))
+    speed, bend = 12.7 * turns * np.cos(turns * time_s), -12.7 * turns**2 * np.sin(turns * time_s)
+    torque = 1.9e-4 * bend + 1.7e-4 * speed + 0.08 * np.sign(speed) + 0.016 * rng.standard_normal(rows)
+    found = fit_plain_model([motion_data(motor, torque, period_s)])
+    assert found is not None
+    assert found["inertia"].value == pytest.approx(1.9e-4, rel=0.01)  # by the noise of fast rows 3 % too small
+
+
+def test_a_window_does_not_lengthen_for_a_fast_torque_that_moves_the_axis() -> None:
+    """A longer window takes it from the acceleration, and from the torque."""
+    rng, rows = np.random.default_rng(5), 12_000
+    torque = lfilter([0.2], [1.0, -0.8], rng.standard_normal(rows))
+    motor = np.cumsum(np.cumsum(torque - torque.mean()) * PERIOD_S / 1e-3) * PERIOD_S
+    motor += 1e-5 * rng.standard_normal(rows)
+    noise = position_noise(motor)[1]
+    assert motion_data(motor, torque, PERIOD_S).window == quiet_window(motor, noise, PERIOD_S)

@@ -32,6 +32,7 @@ from hil.importing.joined_logs import join_logs
 from hil.importing.map_text import asked_lines, map_text
 from hil.importing.own_units import COUNT_AS, take_own_units
 from hil.importing.readme import FileHints
+from hil.importing.several_files import is_whole, set_points_alone
 from hil.importing.still_open import still_open
 from hil.recording.recording import Recording, read_recording
 
@@ -133,13 +134,15 @@ def explain(
         raise InputError("sources: given none, allowed one or more; give the recordings to explain")
     folder = Path(f"explained-{paths[0].stem}") if folder is None else Path(folder)
     told = FileHints(rate_hz, axis, None if readme is None else Path(readme))
+    alone = set_points_alone(paths)
     try:
-        read, assumed = _recordings(paths, folder, told, progress)
+        read, assumed = _recordings([one for one in paths if one not in alone], folder, told, progress)
+        assumed = [*(f"{one}: left out: it has set-points alone" for one in alone), *assumed]
     except PartOfAxis:
         if len(paths) == 1:
             raise
         joined = folder / f"{paths[0].stem}-joined.csv"
-        how = join_logs(paths, joined, any(_is_whole(one, told) for one in paths))
+        how = join_logs(paths, joined, any(is_whole(one, told) for one in paths))
         read, assumed = _recordings([joined], folder, told._replace(rate_hz=None), progress)
         assumed = [how, *assumed]
     unsized = [channel for channels in _unsized(assumed).values() for channel in channels]
@@ -204,14 +207,6 @@ def _same(one: object, other: object) -> bool:
             for key, value in one.items()
         )
     return one == other
-
-
-def _is_whole(source: Path, told: FileHints) -> bool:
-    """True if a file has what a recording needs, by itself."""
-    try:
-        return all(one.key != "column" for one in draft_map(source, *told).asked)
-    except PartOfAxis:
-        return False
 
 
 def _map_path(source: Path, sources: Sequence[Path], folder: Path) -> Path:

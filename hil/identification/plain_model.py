@@ -36,7 +36,6 @@ from hil.identification.derivatives import (
 from hil.identification.least_squares import SIGMAS, Columns, Estimate, LinearFit, least_squares
 from hil.identification.parallel import one_blas_thread
 from hil.identification.torque_lag import shift_of_torque
-from hil.identification.whitening import RANK
 from hil.identification.windows import LONGEST_S, NOISE_SHARE, position_noise, quiet_window
 
 MOTION = ("inertia", "viscous", "coulomb", "offset")  # names of the coefficients without a torque over the position
@@ -123,7 +122,7 @@ def _quiet_beside(torque: FloatArray, position: FloatArray, period_s: float, win
         moved = matched_motion(position, period_s, rows)
         table = np.column_stack([one[longest:-longest] for one in plain_columns(moved).values()])
         wanted = matched(torque, rows)[longest:-longest]
-        values = np.linalg.lstsq(table, wanted, rcond=RANK)[0]
+        values = np.linalg.lstsq(table, wanted, rcond=None)[0]
         return table[:, 0], wanted, float(values[0]), float(np.std(wanted - table @ values))
 
     longest = min(position.size // 4, round(LONGEST_S / period_s))

@@ -31,11 +31,9 @@ _NUMBER = re.compile(r"(?<![\w.^])(?<!\d,)[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?(?!\
 # addresses, the index of a parameter, and what a rated value stands for
 _NO_VALUE = re.compile(r"\b0x[0-9a-f]+(:[0-9a-f]+)?|(?<=\w)\[\d+\]|[(\[]\s*100\s*%\s*[)\]]")
 _BRACKET = re.compile(r"[\[({]([^\[({]*?)[\])}][\s:=;,|\"']*$")
-_SEPARATED = re.compile(r"[\s:=;,|\"']*")
-_PHRASES = re.compile(r"[;,|\t:=\"]+")
+_SEPARATED, _PHRASES = re.compile(r"[\s:=;,|\"']*"), re.compile(r"[;,|\t:=\"]+")
 _SIGNS = re.compile(r"[\s·・*.\"']+")  # between the parts of a unit
-_TEXT_OF_NAME = re.compile(r"[^\w/]+|_")
-_PER = re.compile(r"/|per|pro|je|par")
+_TEXT_OF_NAME, _PER = re.compile(r"[^\w/]+|_"), re.compile(r"/|per|pro|je|par")
 _TURN_IS = re.compile(r"^1\s*(\w+)\s*=\s*([\d.,]+)\s*(\w+)$")  # 1 rev = 5 mm
 _WHOLE_IS = re.compile(  # 100 % = 28 N m, or 28 N m (= 100 %)
     r"100\s*%\s*(?:=|:|is|equals|corresponds to|entspricht)\s*(?P<size>\d[\d.,]*)\s*(?P<unit>[a-z][a-z·* ]*)"
@@ -49,7 +47,9 @@ _PER_MOTOR_TURN = re.compile(
     r" ?(?:/|\b(?:per|pro|je)\b) ?motor[ -]?(?:turn|rev|umdr)"
 )
 _MOTOR_TURN_IS = re.compile(r"\bmotor[ -]?(?:turn|rev\w*|umdrehung) *(?:is|gives|equals|=|:|entspricht) *$")
-_BEHIND = re.compile(r"^ *([a-z]+) ([^\W\d]+)(?= *(?:$|[\[\](){},;:|\t\"]|->|[.] |[.]$| -|directly|direkt))")
+_BEHIND = re.compile(  # 10 mm screw lead
+    r"^ *([a-z]+) ((?:(?:ball ?)?screw |spindle )?[^\W\d]+)(?= *(?:$|[\[\](){},;:|\t\"]|->|[.] |[.]$| -|dire[ck]t))"
+)
 _DEVIATES = re.compile(
     r"\b(error|deviation|tolerance|accura|repeatab|runout|runs? out|backlash|play|noise|eccentric|cyclic|wobble"
     r"|variation|fehler|abweichung|toleranz|spiel|rundlauf)"

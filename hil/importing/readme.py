@@ -178,5 +178,5 @@ def _fits(table: ForeignTable, name: str, told: ToldColumn) -> bool:
         return True
     if told.of:
         named = _own_unit(table, name)
-        return named == told.of or (told.of in WHOLES and named is None)
+        return named == told.of or (named is None and (told.of in WHOLES or not is_whole(table.columns[name])))
     return is_whole(table.columns[name]) if told.step == 1.0 else is_raw(table.columns[name], told.step, 0.0)

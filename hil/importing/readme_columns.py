@@ -25,7 +25,9 @@ _ONE_TURN = re.compile(  # 524288 Inc = 1 rev, of the motor
     r"(?! ?(?:/|per\b|pro\b|of\b|der\b|des\b|\((?:x|×|\d)))",
     re.IGNORECASE,
 )
-_PER_VOLT = re.compile(r"([+-]?\d+(?:\.\d+|,\d{1,2}(?!\d))?(?:e[+-]?\d+)?)\s*([^\W\d][^\d/]*?)\s*(?:/|\bper\b)\s*(m?V)")
+_PER_VOLT = re.compile(
+    r"([+-]?\d+(?:\.\d+|,\d{1,2}(?!\d))?(?:e[+-]?\d+)?)\s*([^\W\d](?:[^\d/]|/(?=s\b|min))*?)\s*(?:/|\b(?:per|pro)\b)\s*(m?V)"
+)
 _EACH = re.compile(r"(?:each|per (?:count|increment|inc|lsb|digit)|/\s*(?:count|inc|lsb|digit))?", re.IGNORECASE)
 _OF_RATED = re.compile(r"(?:of|der|des|vom|du|de la|del|della)\s.*")
 _PER_TURN = re.compile(  # 65536 counts per motor turn
@@ -170,10 +172,10 @@ def _counts(pattern: re.Pattern[str], text: str) -> int | None:
 
 
 def _per_volt(phrase: str) -> ToldColumn | None:
-    """A torque or force for each volt of the column, where a phrase is nothing else: 2 Nm/V; None for others."""
+    """Size and unit for each volt of the column, where a phrase is nothing else: 2 Nm/V; None for others."""
     match = _PER_VOLT.fullmatch(phrase)
     unit = unit_named(match[2]) if match else None
-    if not match or unit is None or QUANTITY_OF_UNIT.get(unit) is not Quantity.EFFORT:
+    if not match or unit is None or QUANTITY_OF_UNIT.get(unit, Quantity.UNKNOWN) in (Quantity.UNKNOWN, Quantity.OTHER):
         return None
     return ToldColumn("", unit, float(match[1].replace(",", ".")), of=match[3])
 

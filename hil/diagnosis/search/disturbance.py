@@ -150,11 +150,21 @@ def friction_periods(
     return strongest_periods(x, torque * np.sign(velocity), 1e-4, 1e-3, most)
 
 
-def waves(runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float, most: int = 3) -> list[float]:
-    """Waves per metre of travel with the largest disturbance, best first, where no revolution is known."""
-    return [
-        1.0 / period_m for period_m in strongest_periods(*_over_travel(runs, disturbances, ratio), 1e-4, 5e-4, most)
-    ]
+def waves(
+    runs: Sequence[Measured],
+    disturbances: Sequence[Disturbance],
+    ratio: float,
+    most: int = 3,
+    weights: Sequence[FloatArray] | None = None,
+) -> list[float]:
+    """Waves per metre of travel with the largest disturbance, best first, where no revolution is known.
+
+    `weights` (n,) of each run: of a disturbance that grows with them, as the ripple does with the torque.
+    """
+    x, torque = _over_travel(runs, disturbances, ratio)
+    if weights is not None:
+        torque = torque * np.concatenate([one[d.sliding] for one, d in zip(weights, disturbances, strict=True)])
+    return [1.0 / period_m for period_m in strongest_periods(x, torque, 1e-4, 5e-4, most)]
 
 
 def rest_position(runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float) -> float:

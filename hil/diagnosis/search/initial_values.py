@@ -57,8 +57,10 @@ def scene(
     if physics.turn_known:
         orders = estimate.orders(runs, disturbances, physics.angle_per_unit)
         orders += estimate.other_orders(runs, disturbances, physics.angle_per_unit)
+        ripple_orders = estimate.orders(runs, disturbances, physics.angle_per_unit, 2, [run.torque for run in runs])
     else:
         orders = estimate.waves(runs, disturbances, ratio)
+        ripple_orders = estimate.waves(runs, disturbances, ratio, 2, [run.torque for run in runs])
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
     per_lead = [lead / period for period in periods if period < lead]
     whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE and physics.turn_known]
@@ -75,9 +77,7 @@ def scene(
         ratio=ratio,
         lead_m=lead,
         orders=orders,
-        ripple_orders=estimate.orders(runs, disturbances, physics.angle_per_unit, 2, [run.torque for run in runs])
-        if physics.turn_known
-        else [],
+        ripple_orders=ripple_orders,
         friction_periods=[*periods, *turns],
         friction_zones=estimate.friction_zones(runs, disturbances, ratio),
         scale_periods=(

@@ -63,6 +63,7 @@ AXIS = axis()
         ("Z axis, ball screw with 10 mm pitch directly coupled to the motor", Constant.LEAD, 0.01),
         ("roller screw 4 mm lead, motor coaxial with the screw.", Constant.LEAD, 0.004),
         ("Spindel mit 5 mm Steigung", Constant.LEAD, 0.005),
+        ("* ACT[mm] - motor encoder converted by the 10 mm screw lead, 1 um display", Constant.LEAD, 0.01),
         ("pulley 160 mm per turn -> 32 mm feed per motor revolution", Constant.LEAD, 0.032),
         (
             "belt 2:1 - ball screw 20 mm lead -> 10 mm ram travel per motor turn. Stroke 0...120 mm",

@@ -13,6 +13,7 @@ from hil.errors import InputError
 from hil.explanation import explain
 from hil.importing.foreign_table import read_table
 from hil.importing.joined_logs import STAMP, join_logs
+from hil.importing.several_files import set_points_alone
 
 AXIS = axis(6000)
 T, EVERY = AXIS["t"], 4  # the controller writes every fourth row
@@ -129,3 +130,15 @@ def test_loggers_of_two_runs_and_files_without_stamps_are_refused(tmp_path: Path
     with pytest.raises(InputError, match=r"bare\.csv: has no stamps"):
         join_logs([other, bare], tmp_path / "joined.csv")
     assert not (tmp_path / "joined.csv").exists()
+
+
+def test_a_file_of_set_points_beside_a_recording_is_left_out(tmp_path: Path) -> None:
+    whole = {"t [s]": T, "x_act [mm]": AXIS["x_act"], "torque_Nm": AXIS["torque"]}
+    (tmp_path / "run.csv").write_text(csv_text(whole))
+    sent = {"t": T, "q_ref": AXIS["x_set"], "dq_ref": np.gradient(AXIS["x_set"], T)}
+    (tmp_path / "sent.csv").write_text(csv_text(sent))
+    paths = [tmp_path / "run.csv", tmp_path / "sent.csv"]
+    assert set_points_alone(paths) == [paths[1]]
+    assert set_points_alone(paths[1:]) == []
+    assert set_points_alone([paths[1], paths[1]]) == []
+    assert set_points_alone([controller(tmp_path / "a.csv"), drive(tmp_path / "b.parquet")]) == []

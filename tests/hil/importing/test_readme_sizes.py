@@ -248,6 +248,20 @@ def test_a_ratio_to_volts_is_the_scale_of_a_column_in_volts(line: str, size: flo
     np.testing.assert_allclose(read_recording(tmp_path / "out.parquet")["torque_n_m"], AXIS["torque"], atol=1e-6)
 
 
+def test_a_table_tells_what_a_volt_of_each_channel_of_a_scope_is(tmp_path: Path) -> None:
+    """The file says V of none of them, and what it holds are no whole numbers."""
+    columns = {"TIME": AXIS["t"], "CH1": np.degrees(AXIS["angle"]) / 36.0, "CH2": AXIS["torque"] / 0.6 / 2.0}
+    path = write(tmp_path / "scope.csv", columns)
+    (tmp_path / "README.md").write_text(
+        "Torque motor 0.6 Nm/A\n\n| channel | signal | scale |\n|---|---|---|\n"
+        "| CH1 | table angle potentiometer | 36 degrees per V |\n| CH2 | armature current | 2 A per V |\n"
+    )
+    import_(path, None, tmp_path / "out.parquet", readme=tmp_path / "README.md")
+    recording = read_recording(tmp_path / "out.parquet")
+    np.testing.assert_allclose(np.ptp(recording["motor_position_rad"]), np.ptp(AXIS["angle"]), rtol=1e-4)
+    np.testing.assert_allclose(recording["torque_n_m"], AXIS["torque"], atol=1e-5)
+
+
 def test_sentences_tell_columns_whose_names_are_words() -> None:
     lines = ["Pos act in mm. I act in drive digits: 16384 digits = 16 A. Positive current pushes.", "1 turn = 5 mm."]
     told = told_columns(lines, ["Idx", "Pos act", "I act"])

@@ -18,6 +18,7 @@ from hil.diagnosis.search.disturbance import (
     lines_hz,
     other_orders,
     scale_periods,
+    waves,
 )
 from hil.identification.measured import take
 
@@ -114,3 +115,15 @@ def test_a_ripple_of_what_turns_slower_than_the_motor_is_found() -> None:
     ripple = Disturbance(0.5 * np.sin(0.505 * angle) + noise, velocity, np.abs(velocity) > 0.05)
     run = SimpleNamespace(motor=angle, period_s=2e-3)
     assert other_orders([run], [ripple], 1.0)[-1] == pytest.approx(0.505, abs=0.01)
+
+
+def test_a_ripple_of_a_linear_motor_is_found_by_its_torque() -> None:
+    """Its sign turns with each acceleration: over the position alone its wave is split in two."""
+    t = np.arange(20_000) * 1e-3
+    x, bend = 0.12 * np.sin(3.0 * t) + 0.05 * np.sin(7.1 * t), -1.08 * np.sin(3.0 * t) - 2.52 * np.sin(7.1 * t)
+    noise = np.random.default_rng(3).normal(0.0, 0.02, t.size)
+    velocity = np.gradient(x, t)
+    ripple = Disturbance(0.024 * bend * np.cos(2.0 * np.pi * 62.5 * x) + noise, velocity, np.abs(velocity) > 0.02)
+    run: Any = SimpleNamespace(motor=x)
+    assert waves([run], [ripple], 1.0, 2, [bend])[0] == pytest.approx(62.5, rel=0.01)
+    assert all(abs(one / 62.5 - 1.0) > 0.01 for one in waves([run], [ripple], 1.0))

@@ -77,7 +77,8 @@ def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     told = {name: one for alias, one in of_several.items() for name in several[alias]} | told
     if parts := _last_parts(titles):
         told = {parts[part]: one for part, one in told_columns(lines, list(parts)).items()} | told
-    told, constants = {name: one for name, one in told.items() if _fits(table, name, one)}, header_values(lines, {})
+    told = {name: fits for name, one in told.items() if _fits(table, name, fits := _in_volts(one))}
+    constants = header_values(lines, {})
     if lead := travel_told(lines, constants.get(Constant.LEAD)):
         constants[Constant.LEAD] = lead
     if motors := _motor_encoders(told):  # each encoder has its own counts
@@ -156,6 +157,14 @@ def _as_angle(table: ForeignTable, name: str, told: ToldColumn) -> ToldColumn:
     if not (told.per_turn and counts) or label(name, "", told.words).command:
         return told
     return told._replace(unit="deg", step=360.0 / told.per_turn)
+
+
+def _in_volts(told: ToldColumn) -> ToldColumn:
+    """What is told of a voltage, if its scale per volt is another quantity: the speed constant of a motor, 60 rpm/V."""
+    said = label("", "", told.words).quantity
+    of_unit = QUANTITY_OF_UNIT.get(unit_named(told.unit) or "")
+    other = told.of in ("V", "mV") and said not in (Quantity.UNKNOWN, Quantity.OTHER, of_unit)
+    return ToldColumn(told.words, told.of) if other else told
 
 
 def _is_firm(table: ForeignTable, name: str, told: ToldColumn) -> bool:

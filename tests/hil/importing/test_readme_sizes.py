@@ -13,8 +13,10 @@ from hil.arrays import FloatArray
 from hil.commands.import_ import import_
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
+from hil.importing.foreign_table import read_table
 from hil.importing.lexicon import Quantity
 from hil.importing.map_text import map_text
+from hil.importing.readme import with_readme
 from hil.importing.readme_columns import told_columns
 from hil.recording.recording import read_recording
 
@@ -281,6 +283,7 @@ def test_a_sentence_lists_columns_with_units_in_brackets() -> None:
         "- torque: measured torque in Nm (transducer 2 Nm/V)",
         "- torque: measured torque [Nm]. The brake needs 8 Nm/V.",
         "- torque: measured, 1 pitch = 5 mm, in Nm",
+        "- torque: torque in Nm, motor 60 rpm/V",
     ],
 )
 def test_a_plain_unit_goes_before_ratios_of_something_else(line: str) -> None:
@@ -328,3 +331,14 @@ def test_a_text_may_give_one_name_to_the_columns_of_several_runs(tmp_path: Path)
     found = read_recording(tmp_path / "out.parquet")
     np.testing.assert_allclose(found["motor_position_rad"], AXIS["angle"], atol=4e-4)
     np.testing.assert_allclose(np.ptp(found["table_position_m"]), np.ptp(AXIS["angle"]) / 101.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("words", "unit", "scale"), [("voltage in V", "V", 1.0), ("tacho", "rpm", 60.0)])
+def test_the_speed_constant_of_a_motor_is_no_scale_of_its_voltage(
+    words: str, unit: str, scale: float, tmp_path: Path
+) -> None:
+    path = write(tmp_path / "log.csv", {"time_s": AXIS["t"], "pos_rad": AXIS["angle"], "u": AXIS["torque"]})
+    (tmp_path / "README.md").write_text(f"- pos_rad: rad\n- u: {words}, 60 rpm/V\n")
+    table = with_readme(read_table(path), tmp_path / "README.md")
+    assert table.units["u"] == unit
+    assert table.scales.get("u", (1.0, 0.0))[0] == scale

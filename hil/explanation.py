@@ -142,7 +142,7 @@ def explain(
         if len(paths) == 1:
             raise
         joined = folder / f"{paths[0].stem}-joined.csv"
-        how = join_logs(paths, joined, any(is_whole(one, told) for one in paths))
+        how = join_logs(paths, joined, any(is_whole(one, told) for one in paths), told)
         read, assumed = _recordings([joined], folder, told._replace(rate_hz=None), progress)
         assumed = [how, *assumed]
     unsized = [channel for channels in _unsized(assumed).values() for channel in channels]

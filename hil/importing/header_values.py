@@ -95,8 +95,8 @@ def header_values(lines: Iterable[str], scalars: Mapping[str, float]) -> dict[Co
 
 def _statements(line: str) -> Iterator[Statement]:
     """Statements of a line; numbers that follow the first one without words are those of other channels."""
-    folded = _NO_VALUE.sub(" ", _folded(line.strip().strip('"#%/ ')))
-    if count := size_of_count(folded, header_text(line)):
+    folded, shown = _NO_VALUE.sub(" ", _folded(line.strip().strip('"#%/ '))), header_text(line)
+    if count := size_of_count(folded, shown):
         yield count
     if turn := _TURN_IS.match(folded):
         size, unit = _number(turn[2]), f"{turn[3]}/{turn[1]}"
@@ -104,26 +104,26 @@ def _statements(line: str) -> Iterator[Statement]:
         return
     if (whole := _WHOLE_IS.search(folded)) and (size := _number(whole["size"] or whole["before"])) is not None:
         units = tuple(_units_behind(whole["unit"] or whole["its"]))
-        yield from (Statement(f"rated {of}", size, units, header_text(line)) for of in ("torque", "force", "current"))
+        yield from (Statement(f"rated {of}", size, units, shown) for of in ("torque", "force", "current"))
         if whole["size"]:  # the rest of the line says of which
             return
     matches = list(_NUMBER.finditer(folded))
     for index, match in enumerate(matches):
         before = folded[matches[index - 1].end() if index else 0 : match.start()]
-        end = matches[index + 1].start() if index + 1 < len(matches) else len(folded)
-        value, behind = _number(match[0]), folded[match.end() : end]
+        rest = folded[match.end() :]
+        behind = rest[: matches[index + 1].start() - match.end() if matches[index + 1 :] else None]
+        value = _number(match[0])
         if value is None or _is_list(folded, matches[index:], value):
             continue
         restated = index and _RESTATED.search(before)  # 1.6e-4 kg m2 (= 1.6 at the joint)
         if restated or (_EQUALS.fullmatch(behind) and before.endswith("(")):  # (1000 = 3.2 Nm)
             continue
         if not _THOUSANDS.fullmatch(match[0]):
-            yield from told_behind(folded[: match.start()], before, value, behind, header_text(line))
-        if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, header_text(line))):
+            yield from told_behind((folded[: match.start()], rest), before, value, behind, shown)
+        if not _BRACKET.search(before) and (lead := _lead_behind(before, value, behind, shown)):
             yield lead
         if re.search(r"[^\W\d]", before):
-            told = _words_before(before, value, behind, header_text(line))
-            yield replace(told, grouped=bool(_GROUPED.fullmatch(match[0])))
+            yield replace(_words_before(before, value, behind, shown), grouped=bool(_GROUPED.fullmatch(match[0])))
 
 
 def _words_before(before: str, value: float, behind: str, line: str) -> Statement:

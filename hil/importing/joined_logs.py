@@ -1,4 +1,4 @@
-"""Join the files of several loggers of one run into one, by their stamps.
+"""Join the files of several loggers of one run into one, by their stamps, or by the numbers of equal rows.
 
 The rows are those of the slowest logger with a position or a torque, within the time that all have. Of a faster logger
 a row has the mean over the time of a row, of a slower one the value between its stamps; none where a logger has a gap.
@@ -22,6 +22,8 @@ from hil.importing.clock import find_clock, time_columns
 from hil.importing.draft_map import labels_of, scaled
 from hil.importing.foreign_table import read_table
 from hil.importing.lexicon import Constant, Quantity
+from hil.importing.readme import NO_HINTS, FileHints, with_readme
+from hil.importing.row_counters import counts_rows
 from hil.importing.rows import without_duplicates
 from hil.importing.units import split_unit
 from hil.importing.wraps import unwrapped, wrap_range
@@ -38,7 +40,8 @@ STAMP = "time [s]"
 class _Log:
     """Stamps (n,) of a logger [s], the channels (n,) of its file, and lines on its constants.
 
-    `dated`: the stamps are of a day. `moves`: it has a position, a speed or a torque.
+    `dated`: the stamps are of a day. `moves`: it has a position, a speed or a torque. `numbered`: it has no stamps but
+    a rate.
     """
 
     name: str
@@ -47,6 +50,7 @@ class _Log:
     told: tuple[str, ...]
     dated: bool
     moves: bool
+    numbered: bool
 
     @property
     def step_s(self) -> float:
@@ -62,14 +66,18 @@ class _Log:
         return self.common_s(other, shift_s) >= _LEAST * min(float(np.ptp(one.stamps_s)) for one in (self, other))
 
 
-def join_logs(paths: Sequence[Path], joined: Path, one_is_whole: bool = False) -> str:
+def join_logs(paths: Sequence[Path], joined: Path, one_is_whole: bool = False, hints: FileHints = NO_HINTS) -> str:
     """Write the channels of all files to `joined` (.csv), stamps first; return a note on what was assumed.
 
     Clocks with dates may differ by the zone of time; others are one clock, unless `one_is_whole`: a file that is a
-    recording by itself is joined by dates alone. Raises InputError: a file without stamps or whose clock runs back, or
-    loggers with less than half of the shortest run in common.
+    recording by itself is joined by dates alone. Files without stamps, of one rate and as many rows, have the same
+    rows; `hints` may tell the rate. Raises InputError: a file without stamps beside one with them, a clock that runs
+    back, or loggers with less than half of the shortest run in common.
     """
-    logs = [_read(path) for path in paths]
+    logs = [_read(path, hints) for path in paths]
+    if any(one.numbered for one in logs) and len({(one.numbered, *one.stamps_s[[1, -1]]) for one in logs}) > 1:
+        bare = next(one.name for one in logs if one.numbered)
+        raise InputError(f"{bare}: has no stamps by which to join another logger; give a file with them")
     names = listed(one.name for one in logs)
     if one_is_whole and not all(one.dated for one in logs):
         raise InputError(
@@ -103,30 +111,31 @@ def join_logs(paths: Sequence[Path], joined: Path, one_is_whole: bool = False) -
     write_text(joined, "".join(f"# {line}\n" for one in logs for line in one.told) + content.getvalue().decode())
     zones = [f"{one.name} by {shift_s / 3600.0:+g} h" for one, shift_s in zip(logs, shifts_s, strict=True) if shift_s]
     return (
-        f"{joined}: {names} are taken for loggers of one run and joined by their stamps, at the {rows_s.size} rows of "
+        f"{joined}: {names} are taken for loggers of one run and joined by their "
+        f"{'rows' if logs[0].numbered else 'stamps'}, at the {rows_s.size} rows of "
         f"{rows.name}{f'; clocks shifted: {listed(zones)}' if zones else ''}"
     )
 
 
-def _read(path: Path) -> _Log:
+def _read(path: Path, hints: FileHints) -> _Log:
     table = read_table(path)
     times = time_columns(table, labels_of(table))
     table = on_one_clock(table, labels_of(table)).table
     table = replace(table, columns=without_duplicates(table.columns).columns, lines=None)
     labels = labels_of(table)
-    clock = find_clock(table, labels, None)
-    if clock.time is None:
-        raise InputError(f"{path}: has no stamps by which to join another logger; give a file with them")
+    clock = find_clock(with_readme(table, hints.readme) if hints.readme else table, labels, hints.rate_hz)
     if not np.all(np.diff(clock.time_s) > 0.0) or clock.time_s.size < 2:
         raise InputError(f"{path}: its clock runs back, stands still or has one row; give a file in order of time")
-    first_s = float(table.columns[clock.time.column][0]) * clock.time.seconds
-    if (part := clock.time.fraction) is not None:
-        first_s += part.seconds * float(table.columns[part.column][0])
-    dated = clock.time.column in table.dates or first_s > _DATED_S
+    first_s, dated = 0.0, False
+    if clock.time is not None:
+        first_s = float(table.columns[clock.time.column][0]) * clock.time.seconds
+        if (part := clock.time.fraction) is not None:
+            first_s += part.seconds * float(table.columns[part.column][0])
+        dated = clock.time.column in table.dates or first_s > _DATED_S
     channels = {
         name: scaled(table, name)
         for name, values in table.columns.items()
-        if name not in {*clock.columns, *times} and np.isfinite(values).any()
+        if name not in {*clock.columns, *times} and np.isfinite(values).any() and not counts_rows(values)
     }
     wraps = {name: size for name, values in channels.items() if (size := wrap_range(values)) is not None}
     channels |= {name: unwrapped(channels[name], size) for name, size in wraps.items()}
@@ -139,6 +148,7 @@ def _read(path: Path) -> _Log:
         tuple(one.text for constant, one in table.constants.items() if constant not in of_rows),
         dated,
         any(labels[name].quantity in of_motion for name in channels),
+        clock.time is None,
     )
 
 

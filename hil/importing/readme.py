@@ -59,6 +59,9 @@ class FileHints(NamedTuple):
         return [text for name, value in told if value for text in (name, str(value))]
 
 
+NO_HINTS = FileHints()
+
+
 def with_readme(table: ForeignTable, readme: Path) -> ForeignTable:
     """Add the constants, and the units and words of columns, that a README tells; what the file says goes first.
 

@@ -124,10 +124,11 @@ def _may_count(label: Label) -> bool:
 
 
 def may_be_asked(columns: dict[str, FloatArray], labels: dict[str, Label], used: Collection[str] = ()) -> list[str]:
-    """Columns (n,) that move, are not `used`, and whose names do not say that they are no channel."""
+    """Columns (n,) that move, are not `used` and no counters, and whose names do not say that they are no channel."""
     none = (Quantity.OTHER, Quantity.ACCELERATION, Quantity.TIME)
     open_ones = [name for name in columns if name in labels and name not in used and labels[name].quantity not in none]
-    return [name for name in open_ones if np.ptp(columns[name]) > 0.0]
+    moving = [name for name in open_ones if np.ptp(columns[name]) > 0.0]
+    return [name for name in moving if not (_may_count(labels[name]) and rises_evenly(columns[name]))]
 
 
 def _of_two_axes(

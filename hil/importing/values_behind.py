@@ -18,22 +18,26 @@ _NO_COUNTS = re.compile(
 _PER_SECOND = re.compile(r"^ *(samples|rows|lines) ?(?:per|/) ?s(?:ec|\b)")
 _PER_ROW = re.compile(r"^ *(m?s|us|\w+seconds) (?:per (?:line|row)|apart)\b")
 _LOGGED_AT = re.compile(
-    r"\b(?:logged|recorded|sampled|captured|traced|aufgezeichnet|abgetastet|aufgenommen|enregistre\w*)"
-    r"(?: by the \w+| on the \w+| von \w+)? (?:at|with|mit|a)(?: about| ca)? *$"
+    r"\b(?:logged|recorded|sampled|captured|traced|polled|aufgezeichnet|abgetastet|aufgenommen|enregistre\w*)"
+    r"(?: by(?: the)? \w+| on the \w+| von \w+)?(?: at| with| mit| a)?(?: about| ca| nominal(?:ly)?)? *$"
 )
 _HERTZ = re.compile(r"^ *(k?hz)\b")
-_ALONE = re.compile(r"^ *(k?hz) *(?:$|[,;)|\t]|  )")  # between separators: leg 3   500 Hz; two lines, 500 Hz, 48 s
+_ALONE = re.compile(r"^ *(k?hz) *(?:$|[,;:.)|\t]|  )")  # between separators: leg 3   500 Hz; two lines, 500 Hz
+_LASTS = re.compile(r"^ *(k?hz) *, *\d+(?:[.,]\d+)? ?(?:s|sec|min|seconds|minutes|sekunden|minuten)\b")  # 2 kHz, 28 s
 _BEGINS = re.compile(r"(?:^|  |\t|[(|]|[^\W\d][^,;]*[,;]) *$")
 _OF_RUN = re.compile(r"\b(leg|run|test|trace|log|axis|achse|messung|versuch|recording|aufzeichnung|fahrt|lauf)\b")
-_FORMAT = re.compile(r"\b(separated|delimited|getrennt|header|tabs?|comma|semicolons?|columns?|spalten|rows|zeilen)\b")
+_FORMAT = re.compile(
+    r"\b(separated|delimited|getrennt|header|tabs?|comma|semicolons?|columns?|spalten|rows|zeilen)\b|\w\.\w{2,7}\b"
+)
 _OTHER_HERTZ = re.compile(
     r"\b(\w*loops?|\w*kreis|bandwi?d?th|bandbreite|\w*filter\w*|\w*pass|cut\w*|corner|pwm|switching|carrier|modes?"
     r"|sin(?:es?|us)|resonan\w*|eigen\w*|natural|first|chirp|sweep|multi\w*|noise|rauschen|\w*regler|control\w*"
     r"|umrichter|bus|ethercat|takt|internal\w*|notch|supply|mains|netz|rated|frequency|frequenz|decimated|thinned"
-    r"|resampled|excit\w*|anregung|dither|square|circle|ripple|reversal)\b"
+    r"|resampled|excit\w*|anregung|dither|square|circle|ripple|reversal|vibrat\w*|oscillat\w*)\b"
 )
 _COUNT_IS = re.compile(
-    r"\b1 ?(?:count|cnt|inc|increment|inkrement|digit|tick|lsb) ?(?:=|is|are|equals|entspricht) ?"
+    r"\b(?:1 ?(?:count|cnt|inc|increment|inkrement|digit|tick|lsb) ?(?:=|is|are|equals|entspricht)"
+    r"|(?:counts|increments|inkremente|digits) (?:of|a|zu|von|je)) ?"
     r"(\d+(?:[.,]\d+)?(?:e-?\d+)?) ?([nu]?m|mm)\b"
 )
 _OF_SCALE = re.compile(r"\b(?:\w*encoder|scale|massstab|glass|linear|position)\b(?!.*\b(?:error|probe|display)\b)")
@@ -72,14 +76,16 @@ def size_of_count(text: str, line: str) -> Statement | None:
     return Statement("", 1.0 / size, (f"counts/{told[2]}",), line) if told and size else None
 
 
-def told_behind(ahead: str, before: str, value: float, text: str, line: str) -> Iterator[Statement]:
+def told_behind(around: tuple[str, str], before: str, value: float, text: str, line: str) -> Iterator[Statement]:
     """The statement of a number behind which its words stand, of counts per turn, a rate or a period.
 
-    `before` are the words since the last number, `ahead` all of the line before this one.
+    `before` and `text` are the words since the last number and up to the next one, `around` all of the line.
     """
+    ahead, rest = around
     other = _OTHER_HERTZ.search(re.split(r"[.;]\s", ahead)[-1] + text.partition(";")[0])
     blank = re.search(r"(?:^|  |\t) *$", before)
-    alone = _ALONE.match(text) if _BEGINS.search(before) and (_OF_RUN if blank else _FORMAT).search(ahead) else None
+    of_rows = _LASTS.match(rest) or (_OF_RUN if blank else _FORMAT).search(ahead)
+    alone = _ALONE.match(text) if of_rows and _BEGINS.search(before) else None
     logged = _HERTZ.match(text) if _LOGGED_AT.search(before) else None
     if (rate := logged or alone) and not other:
         yield Statement("sample rate", value, (rate[1],), line, weak=True, alone=not logged)

@@ -13,6 +13,7 @@ from hil.errors import InputError
 from hil.explanation import explain
 from hil.importing.foreign_table import read_table
 from hil.importing.joined_logs import STAMP, join_logs
+from hil.importing.readme import FileHints
 from hil.importing.several_files import set_points_alone
 
 AXIS = axis(6000)
@@ -130,6 +131,27 @@ def test_loggers_of_two_runs_and_files_without_stamps_are_refused(tmp_path: Path
     with pytest.raises(InputError, match=r"bare\.csv: has no stamps"):
         join_logs([other, bare], tmp_path / "joined.csv")
     assert not (tmp_path / "joined.csv").exists()
+
+
+@pytest.mark.parametrize("rows", [T.size, T.size - 7])
+def test_files_without_stamps_have_the_same_rows_if_these_are_as_many(tmp_path: Path, rows: int) -> None:
+    number = np.arange(T.size)
+    moved = {"No": number, "pos [mm]": AXIS["x_act"]}
+    (tmp_path / "moved.csv").write_text(csv_text(moved))
+    driven = {"No": number[:rows], "M_act [Nm]": AXIS["torque"][:rows]}
+    (tmp_path / "driven.csv").write_text(csv_text(driven))
+    (tmp_path / "README.md").write_text("Two files of the scope with the same samples, 1 kHz, 6 s:\n")
+    paths, joined = [tmp_path / "moved.csv", tmp_path / "driven.csv"], tmp_path / "joined.csv"
+    hints = FileHints(readme=tmp_path / "README.md")
+    if rows < T.size:
+        with pytest.raises(InputError, match=r"moved\.csv: has no stamps"):
+            join_logs(paths, joined, hints=hints)
+        return
+    assert "joined by their rows" in join_logs(paths, joined, hints=hints)
+    table = read_table(joined).columns
+    assert set(table) == {STAMP, "pos [mm]", "M_act [Nm]"}
+    assert table[STAMP] == pytest.approx(number * 1e-3, abs=1e-9)
+    assert table["M_act [Nm]"] == pytest.approx(AXIS["torque"], abs=1e-4)
 
 
 def test_a_file_of_set_points_beside_a_recording_is_left_out(tmp_path: Path) -> None:

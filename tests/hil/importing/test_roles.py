@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from foreign_axis import axis, renamed, write
 
+from hil.errors import PartOfAxis
 from hil.importing.column_names import label
 from hil.importing.draft_map import draft_map
 from hil.importing.lexicon import Quantity
@@ -39,6 +40,12 @@ def test_a_following_error_is_no_position_by_its_values(tmp_path: Path) -> None:
     }
     assert not draft.asked
     assert any("grows with speed [rad/s] itself, as a following error does" in note for note in draft.unsure)
+
+
+def test_a_counter_of_rows_is_not_asked_as_the_torque(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", {"No": np.arange(AXIS["t"].size), "pos [rad]": AXIS["angle"]})
+    with pytest.raises(PartOfAxis, match="no torque, force, current, voltage or second encoder"):
+        draft_map(path, rate_hz=1000.0)
 
 
 def test_a_speed_by_its_letter_is_no_position_where_it_explains_a_column_better(tmp_path: Path) -> None:

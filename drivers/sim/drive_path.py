@@ -53,13 +53,14 @@ def drive_torque(p: Any, s: Any, lines: Any, command: float) -> tuple[float, flo
 
 @njit(cache=True)
 def angle_torque(p: Any, torque: float, angle: float, position_m: float, time_s: float) -> float:
-    """Torque of the motor from its current: saturated, fading or sloping torque constant, ripple, cogging."""
+    """Torque of the motor from its current: saturated, drifting or sloping torque constant, ripple, cogging."""
     saturation = p.torque_constant_saturation.coefficient_1_n2_m2
     if saturation > 0.0:
         u = clip(torque, 1.0 / sqrt(3.0 * saturation))  # u (1 - c u^2) is greatest here
         torque = u * (1.0 - saturation * u * u)
-    if p.novel_torque_fade.on:
-        torque *= 1.0 - p.novel_torque_fade.fraction * (1.0 - exp(-time_s / p.novel_torque_fade.time_constant_s))
+    d = p.torque_constant_drift
+    if d.on:
+        torque *= 1.0 + d.fraction * (1.0 - exp(-time_s / d.time_constant_s))
     if p.torque_constant_gradient.on:
         torque += torque * max(p.torque_constant_gradient.slope_1_m * position_m, -1.0)
     e = p.torque_ripple

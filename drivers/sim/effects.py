@@ -115,6 +115,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "torque_ripple": Definition(
         "torque times 1 + fraction sin(cycles theta + phase), unseen by the current",
         {"fraction": ParameterRange(0.0, 1.0), "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE_0}),
+    "torque_constant_drift": Definition(
+        "torque times 1 + fraction (1 - exp(-t / time_constant)), unseen by the current",
+        {"fraction": ParameterRange(-1.0, 1.0), "time_constant_s": _POSITIVE}),
     "torque_constant_gradient": Definition(
         "torque times 1 + slope r theta, at least 0, unseen by the current", {"slope_1_m": _ANY}),
     "torque_constant_saturation": Definition(
@@ -164,9 +167,6 @@ NOVEL: Mapping[str, Definition] = MappingProxyType({
     "novel_hammering": Definition(
         "force on the table in pulses of width_s every period_s from start_s on",
         {"force_n": _ANY, "start_s": _ANY, "period_s": _POSITIVE, "width_s": _POSITIVE}),
-    "novel_torque_fade": Definition(
-        "torque times 1 - fraction (1 - exp(-t / time_constant)), unseen by the current: magnets that warm up",
-        {"fraction": ParameterRange(-1.0, 1.0), "time_constant_s": _POSITIVE}),
 })  # fmt: skip
 EFFECTS: Mapping[str, Definition] = MappingProxyType({**CATALOGUE, **NOVEL})
 

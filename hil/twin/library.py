@@ -42,6 +42,7 @@ from hil.twin.mechanisms import (
     table_side_friction,
     table_side_viscous_friction,
     thermal_growth,
+    torque_constant_drift,
     torque_constant_gradient,
     torque_constant_saturation,
     torque_dead_zone,
@@ -59,6 +60,7 @@ LIBRARY: tuple[Mechanism, ...] = (
     current_loop_lag.MECHANISM,
     torque_constant_saturation.MECHANISM,  # K(angle, current) is the product: the ripple does not saturate it
     torque_constant_gradient.MECHANISM,
+    torque_constant_drift.MECHANISM,
     torque_ripple.MECHANISM,
     cogging_torque.MECHANISM,
     constant_load.MECHANISM,

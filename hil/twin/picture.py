@@ -19,6 +19,7 @@ class Picture(StrEnum):
     COGGING = "torque over motor angle within its period"
     RIPPLE = "torque per ampere over motor angle within its period"
     CONSTANT_OVER_TRAVEL = "torque per ampere over position"
+    CONSTANT_OVER_TIME = "torque per ampere over time"
     LEAD_OVER_TURN = "lead error within a turn"
     LEAD_OVER_TRAVEL = "lead error over position"
     GROWTH = "growth of the lead over time"

@@ -131,6 +131,10 @@ def _ratio(diagnosis: Diagnosis, view: View) -> FloatArray:
     return np.full(view.run.motor.size, diagnosis.given_bench.axis.ratio_m_rad)
 
 
+def _driving(diagnosis: Diagnosis, view: View) -> FloatArray:
+    return view.run.torque
+
+
 def _per_metre(term: Term, diagnosis: Diagnosis, time_s: FloatArray) -> FloatArray:
     """Growth (n,) of a metre of the screw at times (n,)."""
     ends = (_at(term, diagnosis, time_s=time_s, table_m=np.array(place)) for place in (1.0, 0.0))
@@ -197,7 +201,7 @@ LAWS: dict[Picture, DrawnLaw] = {
         lambda term, d, x: _at(term, d, 1.0, angle_rad=x) - 1.0,
         "torque per ampere, change",
         "1",
-        carrier=lambda d, view: view.run.torque,
+        carrier=_driving,
         period=_per_order,
     ),
     Picture.CONSTANT_OVER_TRAVEL: DrawnLaw(
@@ -205,7 +209,10 @@ LAWS: dict[Picture, DrawnLaw] = {
         lambda term, d, x: _at(term, d, 1.0, table_m=x) - 1.0,
         "torque per ampere, change",
         "1",
-        carrier=lambda d, view: view.run.torque,
+        carrier=_driving,
+    ),
+    Picture.CONSTANT_OVER_TIME: DrawnLaw(
+        TIME, lambda term, d, x: _at(term, d, 1.0, time_s=x) - 1.0, "torque per ampere, change", "1", carrier=_driving
     ),
     Picture.LEAD_OVER_TURN: DrawnLaw(
         ANGLE,

@@ -1,21 +1,9 @@
 """Friction drift: friction changes as the axis warms up, all of it or, as a lubricant thins, its viscous part."""
 
-import math
-
-from numba import njit
-
-from hil.twin.mechanism import Block, Mechanism, Moment, Row, SearchHints, Stage, Text, Variant
+from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Variant
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
-
-
-@njit
-def _warming(value: float, at: Moment, parameters: Row, memory: Row) -> float:
-    fraction, time_constant_s = parameters[0], parameters[1]
-    if time_constant_s <= 0.0:
-        return value * (1.0 + fraction)
-    return value * (1.0 - fraction * math.expm1(-at.time_s / time_constant_s))
-
+from hil.twin.settling import settling
 
 MECHANISM = Mechanism(
     id="friction_drift",
@@ -28,10 +16,10 @@ MECHANISM = Mechanism(
         Parameter("time_constant_s", Dimension.TIME, 1.0, 1e4),
     ),
     variants=(
-        Variant(Stage.FRICTION_SCALE, _warming),
+        Variant(Stage.FRICTION_SCALE, settling),
         Variant(
             Stage.VISCOUS_SCALE,
-            _warming,
+            settling,
             "viscous",
             text=Text(
                 "Viscous friction changes by a share of {fraction} while the axis runs, within about "

@@ -36,6 +36,15 @@ def test_torque_constant_is_straight_along_the_travel() -> None:
         assert current == 3.0
 
 
+def test_a_torque_constant_drifts_unseen_by_the_current() -> None:
+    drift = Effect("torque_constant_drift", {"fraction": -0.3, "time_constant_s": 0.01})
+    plant = plant_with(FREE, drift)
+    assert outer_force_n(plant, torque_n_m=2.0) == pytest.approx(2.0 / R, rel=1e-3)
+    plant.advance(0.0, 0.2)
+    assert outer_force_n(plant, torque_n_m=2.0) == pytest.approx(0.7 * 2.0 / R, rel=1e-6)
+    assert plant.torque_n_m == pytest.approx(2.0)
+
+
 def test_torque_constant_falls_with_current() -> None:
     effect = Effect("torque_constant_saturation", {"coefficient_1_n2_m2": 0.002})
     for command in (5.0, -5.0):

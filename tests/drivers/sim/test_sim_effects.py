@@ -36,6 +36,7 @@ SHOWN = {
     "structural_mode": {"frequency_hz": 45.0, "damping_ratio": 0.03},
     "cogging_torque": {"amplitude_n_m": 0.1, "cycles_per_rev": 10, "phase_rad": 0.5},
     "torque_ripple": {"fraction": 0.05, "cycles_per_rev": 6},
+    "torque_constant_drift": {"fraction": -0.3, "time_constant_s": 1.0},
     "torque_constant_gradient": {"slope_1_m": -2.0},
     "torque_constant_saturation": {"coefficient_1_n2_m2": 2e-3},
     "torque_saturation": {"limit_n_m": 2.0},
@@ -72,7 +73,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 37
+    assert len(CATALOGUE) == 38
 
 
 @pytest.mark.parametrize("name", SHOWN)

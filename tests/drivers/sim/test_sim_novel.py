@@ -6,12 +6,11 @@ from math import exp, pi, sin
 
 import numpy as np
 import pytest
-from sim_tools import PERFECT, outer_force_n, plant_with
+from sim_tools import outer_force_n, plant_with
 
 from drivers.sim.axis import AxisTruth, one_mass, two_mass
 from drivers.sim.contact import wander
 from drivers.sim.effects import CATALOGUE, NOVEL, Effect
-from drivers.sim.plant import Plant
 
 R = 0.01 / (2 * pi)
 SLIDING_M_S = 0.1
@@ -77,12 +76,3 @@ def test_vibration_and_hammering_push_the_table() -> None:
     seen = [outer_force_n(plant) > 40.0 for _ in range(25)]  # every second of 50 steps
     assert sum(seen) == pytest.approx(25 * 0.8 / 4, abs=1.5)
     assert not any(seen[:4])
-
-
-def test_torque_fades() -> None:
-    fade = Effect("novel_torque_fade", {"fraction": 0.3, "time_constant_s": 0.01})
-    plant = Plant(frictionless(), PERFECT, [fade])
-    assert outer_force_n(plant, torque_n_m=2.0) == pytest.approx(2.0 / R, rel=1e-3)
-    plant.advance(0.0, 0.2)
-    assert outer_force_n(plant, torque_n_m=2.0) == pytest.approx(0.7 * 2.0 / R, rel=1e-6)
-    assert plant.torque_n_m == pytest.approx(2.0)  # the current does not show it

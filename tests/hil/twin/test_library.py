@@ -44,6 +44,7 @@ TABLE = {
     "structural_mode": ("table", ["frequency_hz", "damping_ratio"]),
     "cogging_torque": ("motor_side", ["amplitude_n_m", "cycles_per_rev", "phase_rad"]),
     "torque_ripple": ("drive", ["fraction", "cycles_per_rev"]),
+    "torque_constant_drift": ("drive", ["fraction", "time_constant_s"]),
     "torque_constant_gradient": ("drive", ["slope_1_m"]),
     "torque_constant_saturation": ("drive", ["coefficient_1_n2_m2"]),
     "torque_saturation": ("drive", ["limit_n_m"]),
@@ -68,6 +69,7 @@ NEUTRAL = {
     "stribeck_friction": {"static_torque_n_m": VALUE, "stribeck_velocity_rad_s": 3.0},
     "position_dependent_friction": {"fraction": 0.0, "period_m": 0.02, "phase_rad": 1.0},
     "friction_drift": {"fraction": 0.0, "time_constant_s": 10.0},
+    "torque_constant_drift": {"fraction": 0.0, "time_constant_s": 10.0},
     "preload_loss": {"zone_m": 1e-4, "stiffness_ratio": 1.0},
     "periodic_lead_error": {
         "amplitude_m": 0.0,

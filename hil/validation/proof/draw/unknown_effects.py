@@ -112,10 +112,6 @@ _UNKNOWN: Mapping[str, tuple[str, Callable[[DrawScale, Rng], dict[str, float]]]]
     "novel_mass_change": ("table", _mass_change),
     "novel_vibration": ("table", _vibration),
     "novel_hammering": ("table", _hammering),
-    "novel_torque_fade": (
-        "drive",
-        lambda s, rng: {"fraction": rng.uniform(0.05, 0.25), "time_constant_s": log_uniform(rng, 2.0, 10.0)},
-    ),
     _LOST_COUNTS: (
         "sensor",
         lambda s, rng: {"events": float(rng.integers(3, 9)), "counts": float(rng.integers(4, 40))},

@@ -5,6 +5,7 @@ from typing import Any
 
 from numba import njit
 
+from drivers.sim.contact import ramp
 from drivers.sim.layout import COMMAND_LINE, delayed, push
 
 
@@ -63,6 +64,11 @@ def angle_torque(p: Any, torque: float, angle: float, position_m: float, time_s:
         torque *= 1.0 + d.fraction * (1.0 - exp(-time_s / d.time_constant_s))
     if p.torque_constant_gradient.on:
         torque += torque * max(p.torque_constant_gradient.slope_1_m * position_m, -1.0)
+    if p.local_torque_constant.on:
+        z = p.local_torque_constant
+        torque *= 1.0 + z.fraction * ramp((position_m - z.begin_m) / z.flank_m) * ramp(
+            (z.end_m - position_m) / z.flank_m
+        )
     e = p.torque_ripple
     torque *= 1.0 + e.fraction * sin(e.cycles_per_rev * angle + e.phase_rad)
     g = p.cogging_torque

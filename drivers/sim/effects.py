@@ -115,6 +115,9 @@ CATALOGUE: Mapping[str, Definition] = MappingProxyType({
     "torque_ripple": Definition(
         "torque times 1 + fraction sin(cycles theta + phase), unseen by the current",
         {"fraction": ParameterRange(0.0, 1.0), "cycles_per_rev": _POSITIVE, "phase_rad": _PHASE_0}),
+    "local_torque_constant": Definition(
+        "torque times 1 + fraction s(x) as local_friction, unseen by the current",
+        {"fraction": ParameterRange(-1.0, 1.0), "begin_m": _ANY, "end_m": _ANY, "flank_m": _POSITIVE}),
     "torque_constant_drift": Definition(
         "torque times 1 + fraction (1 - exp(-t / time_constant)), unseen by the current",
         {"fraction": ParameterRange(-1.0, 1.0), "time_constant_s": _POSITIVE}),

@@ -28,7 +28,7 @@ GROUPS = {
     "drive_path": ("torque_saturation", "torque_dead_zone", "current_loop_lag", "transport_delay"),
     "angle_torque": (
         "torque_ripple", "torque_constant_drift", "torque_constant_gradient", "torque_constant_saturation",
-        "cogging_torque",
+        "local_torque_constant", "cogging_torque",
     ),
     "table_force": (
         "external_force", "periodic_force", "spring_load", "end_stop", "gravity_torque", "novel_vibration",

@@ -28,6 +28,7 @@ from hil.twin.mechanisms import (
     load_dependent_friction,
     load_encoder_eccentricity,
     local_friction,
+    local_torque_constant,
     nonlinear_viscous_friction,
     periodic_force,
     periodic_lead_error,
@@ -61,6 +62,7 @@ LIBRARY: tuple[Mechanism, ...] = (
     torque_constant_saturation.MECHANISM,  # K(angle, current) is the product: the ripple does not saturate it
     torque_constant_gradient.MECHANISM,
     torque_constant_drift.MECHANISM,
+    local_torque_constant.MECHANISM,
     torque_ripple.MECHANISM,
     cogging_torque.MECHANISM,
     constant_load.MECHANISM,

@@ -73,7 +73,8 @@ class Scene:
     orders: list[float]  # of the disturbance torque, per revolution
     ripple_orders: list[float]  # of a disturbance that grows with the torque
     friction_periods: list[float]  # [m]
-    friction_zones: list[tuple[float, float, float]]  # from, to [m], friction above the rest of the travel [N m]
+    friction_zones: list[tuple[float, float, float]]  # from, to [m], share of friction above the rest of the travel
+    torque_zones: list[tuple[float, float, float]]  # from, to [m], share of the torque above the rest of the travel
     scale_periods: list[float]  # of the table residual [m]
     lines_hz: list[float]  # of the disturbance torque over time
     windows: list[tuple[float, float, float]]  # start, end, level [N m], the most significant first; at least one

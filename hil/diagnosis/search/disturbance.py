@@ -23,7 +23,7 @@ from hil.identification.whitening import RANK, filtered, whitening_filter
 _SMOOTH_S = 0.006  # mean of the innovations: passes 60 Hz, reduces encoder counts
 _FINE_M, _COARSEST_M = 1e-3, 1e-2  # signal periods of scales: optical and magnetic ones below, inductive ones above
 _PASS_HZ = 60.0  # above, the mean attenuates a ripple by more than a fifth
-_BINS = 400  # of the travel, for zones of friction
+_BINS = 400  # of the travel, for zones
 _ORDERS = np.arange(1, 161)  # of the motor angle: slots, pole passings, and their common multiples
 _FEWEST_ROWS, _MOST_ROWS = 100, 20_000  # for orders
 _SLOW = 0.05  # of the rows tell an order: most rows of a fast axis do not show a fine ripple
@@ -219,25 +219,30 @@ def force_windows(run: Measured, d: Disturbance, most: int = 3) -> list[tuple[fl
     return found
 
 
-def friction_zones(
-    runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float
+def zones(
+    runs: Sequence[Measured], disturbances: Sequence[Disturbance], ratio: float, weights: Sequence[FloatArray]
 ) -> list[tuple[float, float, float]]:
-    """Zones of the travel with the most significant constant friction above and below the mean, best first.
+    """Zones of the travel with the most significant constant share of `weights` above and below the mean, best first.
 
-    Each is start, end [m] and level [motor units]. The torque against the motion is summed in bins of the position by
-    the motor encoder, both directions together, so that a constant force and a lag of the observer cancel.
+    Each is start, end [m] and share. `weights` (n,) of each run: friction against the motion, or the torque. They and
+    the disturbance are summed in bins of the position by the motor encoder, both directions together, so that a
+    constant force and a lag of the observer cancel.
     """
     x, torque = _over_travel(runs, disturbances, ratio)
-    against = -torque * np.sign(np.concatenate([d.velocity[d.sliding] for d in disturbances]))
-    if x.size < 100 or np.ptp(x) == 0.0:
+    weight = np.concatenate([one[d.sliding] for one, d in zip(weights, disturbances, strict=True)])
+    size = float(np.sqrt(np.mean(weight**2))) if x.size else 0.0
+    if x.size < 100 or np.ptp(x) == 0.0 or size == 0.0:
         return []
+    weight = weight / size
     width = float(np.ptp(x)) / _BINS
     index = np.minimum(((x - x.min()) / width).astype(int), _BINS - 1)
-    sums = np.bincount(index, weights=against, minlength=_BINS).astype(np.float64)
-    counts = np.bincount(index, minlength=_BINS).astype(np.float64)
+    sums = np.bincount(index, weights=weight * torque, minlength=_BINS).astype(np.float64)
+    counts = np.bincount(index, weights=weight**2, minlength=_BINS).astype(np.float64)
     levels = sorted(_levels(sums, counts), key=lambda level: -level.score)
     start = float(x.min())
-    return [(start + width * one.first, start + width * one.last, one.level) for one in levels if one.score > 0.0]
+    return [
+        (start + width * one.first, start + width * one.last, one.level / size) for one in levels if one.score > 0.0
+    ]
 
 
 class _Level(NamedTuple):

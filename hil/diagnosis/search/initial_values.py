@@ -52,21 +52,22 @@ def scene(
     travel = max(float(np.ptp(run.position_command_m)) for run in runs)
     facts = axis_facts(bench, runs)
     lead = 2.0 * np.pi * ratio / physics.angle_per_unit
+    friction, torques = max(physics.coulomb_n_m, 1e-6), [run.torque for run in runs]
     # a screw-locked effect is periodic in the angle and along the travel: orders and periods start each other
     periods = estimate.friction_periods(runs, disturbances, ratio)
     if physics.turn_known:
         orders = estimate.orders(runs, disturbances, physics.angle_per_unit)
         orders += estimate.other_orders(runs, disturbances, physics.angle_per_unit)
-        ripple_orders = estimate.orders(runs, disturbances, physics.angle_per_unit, 2, [run.torque for run in runs])
+        ripple_orders = estimate.orders(runs, disturbances, physics.angle_per_unit, 2, torques)
     else:
         orders = estimate.waves(runs, disturbances, ratio)
-        ripple_orders = estimate.waves(runs, disturbances, ratio, 2, [run.torque for run in runs])
+        ripple_orders = estimate.waves(runs, disturbances, ratio, 2, torques)
     turns = [lead / order for order in dict.fromkeys((1.0, 2.0, *orders)) if _SHORTEST_M < lead / order < travel]
     per_lead = [lead / period for period in periods if period < lead]
     whole = [float(round(order)) for order in per_lead if abs(order - round(order)) < _WHOLE and physics.turn_known]
     orders = list(dict.fromkeys((*orders, *whole)))
     return Scene(
-        coulomb=max(physics.coulomb_n_m, 1e-6),
+        coulomb=friction,
         peak_torque=max(float(np.max(np.abs(run.torque))) for run in runs),
         peak_speed=max(float(np.max(np.abs(d.velocity))) for d in disturbances),
         viscous_speed=max(physics.viscous_speed, 1e-6),
@@ -79,7 +80,10 @@ def scene(
         orders=orders,
         ripple_orders=ripple_orders,
         friction_periods=[*periods, *turns],
-        friction_zones=estimate.friction_zones(runs, disturbances, ratio),
+        friction_zones=estimate.zones(
+            runs, disturbances, ratio, [-friction * np.sign(d.velocity) for d in disturbances]
+        ),
+        torque_zones=estimate.zones(runs, disturbances, ratio, torques),
         scale_periods=(
             estimate.scale_periods(runs, [block["table"] for block in blocks]) if runs[0].table_m.size else []
         ),

@@ -36,6 +36,14 @@ def test_torque_constant_is_straight_along_the_travel() -> None:
         assert current == 3.0
 
 
+@pytest.mark.parametrize(("x", "share"), [(0.05, 1.0), (0.1, 0.9), (0.15, 0.8), (0.205, 0.95), (0.25, 1.0)])
+def test_a_torque_constant_is_lower_in_a_zone(x: float, share: float) -> None:
+    zone = {"fraction": -0.2, "begin_m": 0.1, "end_m": 0.2, "flank_m": 0.02}
+    torque, current = torque_and_current(Effect("local_torque_constant", zone), 3.0, x / R)
+    assert torque == pytest.approx(3.0 * share, rel=1e-9)
+    assert current == 3.0
+
+
 def test_a_torque_constant_drifts_unseen_by_the_current() -> None:
     drift = Effect("torque_constant_drift", {"fraction": -0.3, "time_constant_s": 0.01})
     plant = plant_with(FREE, drift)

@@ -55,6 +55,7 @@ SHOWN = {
     "gravity_torque": {"gravity_torque_n_m": 300.0, "angle_rad": 1.0},
     "friction_gradient": {"slope_1_m": 3.0},
     "load_dependent_friction": {"share": 0.2},
+    "local_torque_constant": {"fraction": -0.2, "begin_m": 0.01, "end_m": 0.03, "flank_m": 2e-3},
     "local_friction": {"fraction": 0.5, "begin_m": 0.01, "end_m": 0.03, "flank_m": 2e-3},
 }
 EFFECTS = {name: Effect(name, parameters) for name, parameters in SHOWN.items()}
@@ -73,7 +74,7 @@ def test_catalogue_holds_exactly_the_interface() -> None:
         for name, definition in CATALOGUE.items()
     }
     assert required == {name: set(parameters) for name, parameters in SHOWN.items()}
-    assert len(CATALOGUE) == 38
+    assert len(CATALOGUE) == 39
 
 
 @pytest.mark.parametrize("name", SHOWN)

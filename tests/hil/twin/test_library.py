@@ -45,6 +45,7 @@ TABLE = {
     "cogging_torque": ("motor_side", ["amplitude_n_m", "cycles_per_rev", "phase_rad"]),
     "torque_ripple": ("drive", ["fraction", "cycles_per_rev"]),
     "torque_constant_drift": ("drive", ["fraction", "time_constant_s"]),
+    "local_torque_constant": ("drive", ["fraction", "begin_m", "end_m", "flank_m"]),
     "torque_constant_gradient": ("drive", ["slope_1_m"]),
     "torque_constant_saturation": ("drive", ["coefficient_1_n2_m2"]),
     "torque_saturation": ("drive", ["limit_n_m"]),

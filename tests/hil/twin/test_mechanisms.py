@@ -152,14 +152,13 @@ def test_load_dependent_friction_is_a_share_of_the_torque_that_is_carried(level,
     length=st.floats(0.02, 0.3),
     flank=st.floats(1e-3, 0.02),
     share=st.floats(-1.0, 1.0),
+    effect=st.sampled_from(["local_friction", "local_torque_constant"]),
 )
-def test_local_friction_is_symmetric_about_its_zone_and_acts_only_there(
-    level, fraction, start, length, flank, share
-) -> None:
+def test_a_zone_is_symmetric_and_acts_only_there(level, fraction, start, length, flank, share, effect) -> None:
     def at(position):
         moment = AT_REST._replace(table_position_m=position)
         values = {"fraction": fraction, "begin_m": start, "end_m": start + length, "flank_m": flank}
-        return call("local_friction", level, moment, **values)
+        return call(effect, level, moment, **values)
 
     middle = start + 0.5 * length
     for offset in (share * length, 0.0, 0.5 * length):
@@ -234,10 +233,14 @@ def test_drag_of_a_thinning_lubricant_rises_with_the_root_of_the_speed(quadratic
     assert drag(velocity) == 0.0  # no lubricant makes friction fall like that
 
 
-@given(fraction=st.floats(-0.95, 5.0), tau=st.floats(1.0, 1e4))
-def test_friction_drift_starts_cold_and_settles(fraction, tau) -> None:
+@given(
+    fraction=st.floats(-0.95, 5.0),
+    tau=st.floats(1.0, 1e4),
+    effect=st.sampled_from(["friction_drift", "torque_constant_drift"]),
+)
+def test_a_drift_starts_cold_and_settles(fraction, tau, effect) -> None:
     cold, at_tau, warm = (
-        call("friction_drift", 1.0, AT_REST._replace(time_s=multiple * tau), fraction=fraction, time_constant_s=tau)
+        call(effect, 1.0, AT_REST._replace(time_s=multiple * tau), fraction=fraction, time_constant_s=tau)
         for multiple in (0.0, 1.0, 50.0)
     )
     assert cold == 1.0

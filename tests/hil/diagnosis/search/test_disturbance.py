@@ -14,11 +14,11 @@ from diagnosis_runs import bench
 from hil.diagnosis.search.disturbance import (
     Disturbance,
     force_windows,
-    friction_zones,
     lines_hz,
     other_orders,
     scale_periods,
     waves,
+    zones,
 )
 from hil.identification.measured import take
 
@@ -26,15 +26,17 @@ OWNER = bench()
 
 
 @pytest.mark.parametrize("level", [0.5, -0.3])
-def test_the_zone_is_estimated_from_the_torque_against_the_motion(level: float) -> None:
+@pytest.mark.parametrize("of", ["friction", "torque"])
+def test_the_zone_is_estimated_from_what_varies_in_it(level: float, of: str) -> None:
     run = take(concealed_run(OWNER, {}), OWNER)
     x = OWNER.axis.ratio_m_rad * run.motor
     velocity = np.gradient(run.motor, run.period_s)
     more = np.where((x > 0.22) & (x < 0.30), level, 0.0)
     noise = np.random.default_rng(1).normal(0.0, 0.1, x.size)
-    torque = 0.2 - more * np.sign(velocity) + noise  # the constant force is no friction
-    begin_m, end_m, found = friction_zones(
-        [run], [Disturbance(torque, velocity, np.abs(velocity) > 1.0)], OWNER.axis.ratio_m_rad
+    weight = -2.0 * np.sign(velocity) if of == "friction" else run.torque
+    torque = 0.2 + more * weight + noise  # the constant force is neither
+    begin_m, end_m, found = zones(
+        [run], [Disturbance(torque, velocity, np.abs(velocity) > 1.0)], OWNER.axis.ratio_m_rad, [weight]
     )[0]
     assert (begin_m, end_m) == pytest.approx((0.22, 0.30), abs=3e-3)
     assert abs(found) <= abs(level)

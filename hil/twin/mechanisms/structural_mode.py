@@ -98,7 +98,7 @@ def _longer(chain: Chain) -> Chain:
     )
 
 
-_HIGHEST_HZ = 2000.0
+_LOWEST_HZ, _HIGHEST_HZ = 0.1, 2000.0  # a load that hangs on 25 m; the rate of the loops
 _NEAR = 0.9  # of the highest frequency: beyond, the structure is a mass
 _NO_PEAK = 1.0 / math.sqrt(2.0)  # damping ratio from which there is no resonance
 _LEAST_DAMPING = 1e-4
@@ -118,7 +118,7 @@ MECHANISM = Mechanism(
     "is held; or a base of m_table / mu under the axis, which sways with the table at f",
     source="Den Hartog, Mechanical Vibrations, 4th ed. (1956), auxiliary mass on a spring",
     parameters=(
-        Parameter("frequency_hz", Dimension.FREQUENCY, 1.0, _HIGHEST_HZ, role=Role.FREQUENCY),
+        Parameter("frequency_hz", Dimension.FREQUENCY, _LOWEST_HZ, _HIGHEST_HZ, role=Role.FREQUENCY),
         Parameter("damping_ratio", Dimension.RATIO, _LEAST_DAMPING, 0.9),
         Parameter("mass_ratio", Dimension.RATIO, 1e-3, 10.0, role=Role.STRENGTH),
     ),
@@ -142,8 +142,12 @@ MECHANISM = Mechanism(
                 "axis swings at {frequency_hz}, damped by {damping_ratio}."
             ),
             element="load on an elastic arm, shaft or belt",
-            # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia
-            starts=lambda s: [(f, 0.03, ratio) for f in np.geomspace(1.5, 100.0, 13) for ratio in (0.3, 3.0)],
+            # an arm or a bar swings at some hertz; behind a belt or a gear it may be most of the inertia; a load that
+            # hangs is a small one, and swings below a hertz
+            starts=lambda s: [
+                *((f, 0.03, ratio) for f in np.geomspace(1.5, 100.0, 13) for ratio in (0.3, 3.0)),
+                *((f, 0.03, 0.1) for f in s.lines_hz if f >= _LOWEST_HZ),
+            ],
             observable=lambda table_encoder: not table_encoder,
         ),
     ),

@@ -19,8 +19,10 @@ from hil.twin.mechanisms import (
     friction_drift,
     load_dependent_friction,
     local_friction,
+    local_torque_constant,
     nonlinear_viscous_friction,
     stribeck_friction,
+    torque_constant_drift,
     torque_constant_gradient,
     torque_constant_saturation,
     torque_ripple,
@@ -37,6 +39,7 @@ _STEEPEST_M = 1e-3  # flank of a zone
 _COMPRESSED = 0.5  # of the largest torque: level above which the measured torque is too small
 MOMENTS = (0.25, 0.75)  # shares of the half between which a change lies
 _SLOPED = 0.3  # of the torque constant: change at the farthest place
+_CHANGED = 0.3  # of the torque constant, over the angle, time or a zone
 _SATURATED = 0.25  # of the largest torque: torque per ampere that is lost there
 
 
@@ -76,18 +79,26 @@ def _by_square(half: Half, rng: Rng) -> Edit:
     return _added(half, speed * np.abs(speed), nonlinear_viscous_friction.MECHANISM, told=(0,))
 
 
-def _in_zone(half: Half, rng: Rng) -> Edit | None:
-    at, coulomb = half.position_m, half.plain["coulomb"]
+def _zone(half: Half, rng: Rng) -> tuple[tuple[float, float, float], FloatArray] | None:
+    """Begin, end and flank [m] of a zone of the travel, and the share of it at each row (n,)."""
+    at = half.position_m
     travel = float(np.ptp(at))
     width = travel * rng.uniform(0.15, 0.4)
     flank = 0.2 * width
-    if flank < _STEEPEST_M or not coulomb.significant or coulomb.value <= 0.0:
+    if flank < _STEEPEST_M:
         return None
     begin = float(np.min(at)) + rng.uniform(0.1, 0.5) * travel
-    inside = np.clip(np.minimum(at - begin, begin + width - at) / flank + 0.5, 0.0, 1.0)
+    return (begin, begin + width, flank), np.clip(np.minimum(at - begin, begin + width - at) / flank + 0.5, 0.0, 1.0)
+
+
+def _in_zone(half: Half, rng: Rng) -> Edit | None:
+    coulomb, zone = half.plain["coulomb"], _zone(half, rng)
+    if zone is None or not coulomb.significant or coulomb.value <= 0.0:
+        return None
+    edges, inside = zone
 
     def values(added: float) -> tuple[float, ...]:
-        return added / coulomb.value, begin, begin + width, flank
+        return added / coulomb.value, *edges
 
     most = _HIGHEST * coulomb.value
     return _added(half, inside * half.moved.direction, local_friction.MECHANISM, most, values=values, told=(1, 2))
@@ -149,15 +160,33 @@ def _rippling(half: Half, rng: Rng) -> Edit | None:
     if found is None:
         return None
     order, phase, wave = found
-    torque, mechanism = half.torque, torque_ripple.MECHANISM
-    return Edit(
-        EditedChannel.TORQUE,
-        lambda a: torque / (1.0 + a * wave),
-        0.3,
-        mechanism,
-        lambda a: (a, order, phase),
-        told=(0, 2),
-    )
+    return _scaled(half, wave, torque_ripple.MECHANISM, lambda a: (a, order, phase), (0, 2))
+
+
+def _scaled(
+    half: Half,
+    shape: FloatArray,
+    mechanism: Mechanism,
+    values: Callable[[float], tuple[float, ...]],
+    told: tuple[int, ...],
+) -> Edit:
+    """A torque per ampere that differs by up to `_CHANGED` times a shape (n,) of -1 to 1."""
+    torque = half.torque
+    return Edit(EditedChannel.TORQUE, lambda a: torque / (1.0 + a * shape), _CHANGED, mechanism, values, told=told)
+
+
+def _constant_fades(half: Half, rng: Rng) -> Edit:
+    time_s = max(half.time_s[-1] * rng.uniform(0.2, 1.0), 1.0)
+    shape = np.expm1(-half.time_s / time_s)
+    return _scaled(half, shape, torque_constant_drift.MECHANISM, lambda a: (-a, time_s), (0,))
+
+
+def _constant_in_zone(half: Half, rng: Rng) -> Edit | None:
+    zone = _zone(half, rng)
+    if zone is None or half.ratio != 1.0:
+        return None
+    edges, inside = zone
+    return _scaled(half, -inside, local_torque_constant.MECHANISM, lambda a: (-a, *edges), (0, 1, 2))
 
 
 def _along_the_travel(half: Half, rng: Rng) -> Edit | None:
@@ -225,6 +254,8 @@ TORQUE_EDITS: Mapping[str, Drawn] = {
     "torque over the angle": _cogging,
     "torque constant over the angle": _rippling,
     "torque constant over the travel": _along_the_travel,
+    "torque constant in a zone": _constant_in_zone,
+    "torque constant over time": _constant_fades,
     "torque constant over current": _saturating,
     "current compressed": _compressed,
     "friction by load": _by_load,

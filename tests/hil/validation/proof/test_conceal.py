@@ -25,18 +25,23 @@ RECORDING = Path(__file__).parents[3] / "recordings" / "clean.parquet"
 LAWFUL = ("second encoder late", "torque late", "scale of the second encoder", "second encoder within a short period",
           "second encoder once per turn")  # fmt: skip
 RIGID = ("force in a window", "force in windows")
+DIRECT = "torque constant in a zone"
 SLOW = "scale over time"  # what grows within 2 s is another scale
 
 
 @pytest.fixture(scope="module")
 def uses() -> dict[str, Half]:
-    """First half of a recording with the law of its bench, as a plant, and as a plant of one mass."""
+    """First half of a recording with the law of its bench, as a plant, as one mass, and as one that the motor moves."""
     bench = load_bench("reference")
     lawful, plant = (pair[0] for pair in ways(read_recording(RECORDING), bench))
     one_mass = {"model": "rigid", "lead_m": bench.axis.lead_m, "mass_kg": 700.0, "coulomb_torque_n_m": 1.1,
                 "viscous_torque_n_m_s_rad": 0.0064}  # fmt: skip
     rigid = type(bench).model_validate({"axis": one_mass, "encoders": {"table": None}})
-    return {"law": lawful, "plant": plant, "rigid": replace(plant, bench=rigid)}
+    turned = {"model": "rotary", "gear_ratio": 1.0, "inertia_kg_m2": 2e-3, "coulomb_torque_n_m": 1.1,
+              "viscous_torque_n_m_s_rad": 0.0064}  # fmt: skip
+    direct = type(bench).model_validate({"axis": turned, "encoders": {"table": None}})
+    benches = {"rigid": rigid, "direct": direct}
+    return {"law": lawful, "plant": plant} | {name: replace(plant, bench=one) for name, one in benches.items()}
 
 
 def draw(half: Half, kind: str, tries: int = 40) -> Edit:
@@ -55,7 +60,9 @@ def _told(half: Half, edit: Edit) -> Estimate:
 def of(uses: dict[str, Half], kind: str) -> Half:
     if kind == SLOW:
         return replace(uses["plant"], recording=replace(uses["plant"].recording, period_s=0.002))
-    return uses["rigid" if kind in RIGID else "law" if kind == "torque late" else "plant"]
+    return uses[
+        "direct" if kind == DIRECT else "rigid" if kind in RIGID else "law" if kind == "torque late" else "plant"
+    ]
 
 
 KINDS = list(EDITS)

@@ -70,13 +70,13 @@ def torque_missed(fit: Fit, data: Dataset) -> float | None:
 
 
 def missed_beyond_noise(fit: Fit, data: Dataset) -> float:
-    """Torque of a data set that a twin misses, less the white noise, over the deviation there (rms); 0: not known."""
+    """`torque_missed` less the white noise; 0: not known."""
     missed, slowest = _missed(fit, data) or (math.inf, None)
     if slowest is None or not math.isfinite(missed):
         return 0.0
     gains = [noise_gains(run.period_s, measured_motion(run).window)[0] * run.noise.torque for run in data.runs]
     beyond = missed**2 - float(np.mean(np.square(gains)))
-    return math.sqrt(max(beyond, 0.0)) / torque_deviation([data], slowest)
+    return math.sqrt(max(beyond, 0.0)) / torque_deviation([fit.data, data], slowest)
 
 
 def _missed(fit: Fit, data: Dataset) -> tuple[float, SlowestSliding] | None:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from hil.importing.lexicon import Quantity, lexicon, without_accents
+from hil.importing.spoken_sizes import plain_sizes
 from hil.importing.units import QUANTITY_OF_UNIT, factor_and_unit, unit_named
 
 _WORDS = ("in", "second", "minute", "turn", "revolution", "meter", "metre", "count")  # no units at the end of a phrase
@@ -141,6 +142,7 @@ def _of_both(text: str) -> ToldColumn | None:
 
 def _told(text: str) -> ToldColumn:
     """Words, unit and step of what is said of a column. A plain unit goes before the size of a count."""
+    text = plain_sizes(text)
     phrases = _phrases(text)
     unit = next((unit for part in phrases if (unit := _unit_at_an_end(part))), "")
     volts = next(filter(None, map(_per_volt, phrases)), None) if unit_named(unit) in (None, "V", "mV") else None

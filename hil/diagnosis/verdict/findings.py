@@ -111,8 +111,13 @@ def confidences(searched: Searched, final: Fit, ablations: Sequence[Ablation], h
         rms = _left(fits, channel)
         return 1.0 if channel in noise and rms**2 <= CRITERIA.coloured else rms
 
+    def half_described(ablation: Ablation) -> float:
+        """What two encoders read apart needs no torque."""
+        return 0.0 if ablation.channel == "table" and ablation.by_torque <= 1.0 else missed
+
     return tuple(
-        _sure(final, index, ablation.log_chance) * confidence(left(ablation.channel), _factor(ablation), margin, missed)
+        _sure(final, index, ablation.log_chance)
+        * confidence(left(ablation.channel), _factor(ablation), margin, half_described(ablation))
         for index, (ablation, margin) in enumerate(zip(ablations, margins, strict=True))
     )
 

@@ -32,6 +32,7 @@ from hil.identification.terms import Key, Term, ambiguous, same_torque, within_a
 from hil.identification.torque_left import missed_beyond_noise
 from hil.quantities import digits
 from hil.twin.library import BY_ID
+from hil.twin.mechanism import Block
 from hil.twin.parameter import Dimension
 
 
@@ -111,15 +112,16 @@ def confidences(searched: Searched, final: Fit, ablations: Sequence[Ablation], h
         rms = _left(fits, channel)
         return 1.0 if channel in noise and rms**2 <= CRITERIA.coloured else rms
 
-    def half_described(ablation: Ablation) -> float:
-        """What two encoders read apart needs no torque."""
-        return 0.0 if ablation.channel == "table" and ablation.by_torque <= 1.0 else missed
-
     return tuple(
         _sure(final, index, ablation.log_chance)
-        * confidence(left(ablation.channel), _factor(ablation), margin, half_described(ablation))
+        * confidence(left(ablation.channel), _factor(ablation), margin, 0.0 if _told_by_encoders(ablation) else missed)
         for index, (ablation, margin) in enumerate(zip(ablations, margins, strict=True))
     )
+
+
+def _told_by_encoders(ablation: Ablation) -> bool:
+    """True for an error of a sensor that two encoders tell: they need no torque."""
+    return BY_ID[ablation.term.effect].block is Block.SENSOR and ablation.channel == "table"
 
 
 def _against(searched: Searched, final: Fit, term: Term) -> tuple[list[RivalFit], tuple[str, ...], float]:

@@ -24,6 +24,7 @@ from hil.identification.torque_left import (
     fit_plain,
     left_by_twin,
     measured_motion,
+    missed_beyond_noise,
     needed_torque,
     torque_deviation,
     torque_missed,
@@ -100,6 +101,7 @@ def test_the_torque_of_a_slow_end_is_missed_as_a_share_of_that_of_all_motion(wit
     missed = torque_missed(wrong, part)
     assert missed is not None
     assert missed * every == pytest.approx((left_by_twin(wrong.hypothesis, part, plain, own) or 0.0) * own)
+    assert 0.9 * missed < missed_beyond_noise(wrong, part) < missed
 
 
 def test_a_lead_error_is_asked_without_the_harmonics_that_it_need_not_have() -> None:

@@ -14,7 +14,7 @@ _SHORT = 4  # letters: a longer word may have another ending
 _INERTIA = re.compile(r"inertia|tragheitsmoment|inertie|inerzia|inercia")
 _OF_LINE = re.compile(rf"^(?:\w+ )?(?:{_INERTIA.pattern})(?: about the axis)?$")
 _SENTENCE = re.compile(r"(?<!\bmin)(?<!\bmax)(?<!\bca)[.;]\s")
-_GOES_ON = re.compile(r"k?g[cm]?m|kg(?:\+|plus).*")  # kg m, kg plus others
+_GOES_ON = re.compile(r"k?g[cm]?m|(?:kg|lbs?)(?:\+|plus).*|lbs?(?:in|ft).*")  # kg m, lb in, kg plus others
 
 
 def nominal_told(told: Statement) -> tuple[Constant, float] | None:

@@ -6,7 +6,7 @@ from hil.importing.units import unit_named
 
 _NUMBER = r"(\d+(?:[.,]\d+)?(?:e-?\d+)?)"
 _UNIT = r"([^\W\d][\w·*²^]*(?:/\w+)?(?: m\b)?)"
-_MANY = "units?|steps?|increments?|multiples|einheiten|schritten?|inkrementen"
+_MANY = "units?|steps?|counts|digits|increments?|multiples|einheiten|schritten?|inkrementen?"
 _PARTS = {"tenth": 0.1, "hundredth": 0.01, "thousandth": 1e-3, "millionth": 1e-6, "deci": 0.1, "centi": 0.01,
           "milli": 1e-3, "micro": 1e-6}  # fmt: skip
 _OF_MANY = re.compile(rf"\b(?:in )?(?:{_MANY}) (?:of|von|zu|je) {_NUMBER} ?{_UNIT}", re.IGNORECASE)

@@ -27,7 +27,7 @@ _LASTS = re.compile(r"^ *(k?hz) *, *\d+(?:[.,]\d+)? ?(?:s|sec|min|seconds|minute
 _BEGINS = re.compile(r"(?:^|  |\t|[(|]|[^\W\d][^,;]*[,;]) *$")
 _OF_RUN = re.compile(r"\b(leg|run|test|trace|log|axis|achse|messung|versuch|recording|aufzeichnung|fahrt|lauf)\b")
 _FORMAT = re.compile(
-    r"\b(separated|delimited|getrennt|header|tabs?|comma|semicolons?|columns?|spalten|rows|zeilen)\b|\w\.\w{2,7}\b"
+    r"\b(separated|delimited|getrennt|header|tabs?|comma|semicolons?|columns?|spalten|rows|zeilen)\b|\w\.[a-z]\w{1,6}\b"
 )
 _OTHER_HERTZ = re.compile(
     r"\b(\w*loops?|\w*kreis|bandwi?d?th|bandbreite|\w*filter\w*|\w*pass|cut\w*|corner|pwm|switching|carrier|modes?"
@@ -36,8 +36,7 @@ _OTHER_HERTZ = re.compile(
     r"|resampled|excit\w*|anregung|dither|square|circle|ripple|reversal|vibrat\w*|oscillat\w*)\b"
 )
 _COUNT_IS = re.compile(
-    r"\b(?:1 ?(?:count|cnt|inc|increment|inkrement|digit|tick|lsb) ?(?:=|is|are|equals|entspricht)"
-    r"|(?:counts|increments|inkremente|digits) (?:of|a|zu|von|je)) ?"
+    r"\b1 ?(?:count|cnt|inc|increment|inkrement|digit|tick|lsb) ?(?:=|is|are|equals|entspricht) ?"
     r"(\d+(?:[.,]\d+)?(?:e-?\d+)?) ?([nu]?m|mm)\b"
 )
 _OF_SCALE = re.compile(r"\b(?:\w*encoder|scale|massstab|glass|linear|position)\b(?!.*\b(?:error|probe|display)\b)")

@@ -20,6 +20,7 @@ RAD = np.pi / 180.0
     [
         ("in 0.01 deg steps", ", 1 digit = 0.01 deg"),
         ("increments of 0.088 deg", ", 1 digit = 0.088 deg"),
+        ("optical scale, counts of 0.1 um (int64)", "optical scale, , 1 digit = 0.1 um (int64)"),
         ("in steps of 10 mA", ", 1 digit = 10 mA"),
         ("current, 10 mA units", "current, , 1 digit = 10 mA"),
         ("in 1/100 A", ", 1 digit = 0.01 A"),

@@ -13,17 +13,18 @@ _STEEPEST_M = 1e-3
 _LENGTH_M = 0.03  # of a zone
 _WHOLE = 0.8  # share of the travel above which a zone is the travel, and its value that of the axis
 _FLANKS = (0.1, 0.8)  # of the length of the zone: steep, and nearly a triangle
-EDGES = (
-    Parameter("begin_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE, scale=_LENGTH_M),
-    Parameter("end_m", Dimension.LENGTH, -ANYWHERE, ANYWHERE, scale=_LENGTH_M),
-    Parameter("flank_m", Dimension.LENGTH, _STEEPEST_M, ANYWHERE),
-)
 SHAPE = "s = 1 in the zone, 0 outside, straight flanks; half height at its begin and end"
+
+
+def edges(begin: str, end: str, flank: str) -> tuple[Parameter, ...]:
+    """Parameters of a zone by their names: where it begins and ends, and the length of its flanks [m]."""
+    ends = (Parameter(name, Dimension.LENGTH, -ANYWHERE, ANYWHERE, scale=_LENGTH_M) for name in (begin, end))
+    return (*ends, Parameter(flank, Dimension.LENGTH, _STEEPEST_M, ANYWHERE))
 
 
 @njit
 def changed_in_zone(value: float, at: Moment, parameters: Row, memory: Row) -> float:
-    """The value times 1 + a s(x); `parameters` are a and the `EDGES`."""
+    """The value times 1 + a s(x); `parameters` are a and the `edges`."""
     fraction, begin_m, end_m, flank_m = parameters[0], parameters[1], parameters[2], parameters[3]
     if flank_m <= 0.0:
         return value
@@ -40,7 +41,7 @@ def is_zone(values: Sequence[float], variant: int, axis: AxisFacts) -> bool:
 
 
 def starts_in(zones: Sequence[tuple[float, float, float]]) -> list[tuple[float, ...]]:
-    """Values of a and the `EDGES` for zones of begin, end [m] and a."""
+    """Values of a and the `edges` for zones of begin, end [m] and a."""
     return [
         (fraction, begin_m, end_m, flank * (end_m - begin_m)) for begin_m, end_m, fraction in zones for flank in _FLANKS
     ]

@@ -7,7 +7,7 @@ from hil.twin.mechanism import Block, Mechanism, SearchHints, Stage, Text, Varia
 from hil.twin.parameter import Dimension, Parameter, Role
 from hil.twin.picture import Picture
 from hil.twin.scene import Scene
-from hil.twin.zone import EDGES, SHAPE, changed_in_zone, is_zone, starts_in
+from hil.twin.zone import SHAPE, changed_in_zone, edges, is_zone, starts_in
 
 
 def _starts(scene: Scene) -> list[tuple[float, ...]]:
@@ -21,7 +21,10 @@ MECHANISM = Mechanism(
     element="magnets along the travel",
     equation=f"T = u (1 + a s(x)), {SHAPE}",
     source="Gieras, Piech and Tomczuk, Linear Synchronous Motors (2011), air gap and thrust per ampere",
-    parameters=(Parameter("fraction", Dimension.RATIO, -0.9, 1.0, role=Role.STRENGTH), *EDGES),
+    parameters=(
+        Parameter("fraction", Dimension.RATIO, -0.9, 1.0, role=Role.STRENGTH),
+        *edges("begin_m", "end_m", "flank_m"),
+    ),
     variants=(Variant(Stage.TORQUE, changed_in_zone),),
     text=Text(
         "From {begin_m} to {end_m} of the travel, the torque per ampere is higher by a share of {fraction}; it changes "

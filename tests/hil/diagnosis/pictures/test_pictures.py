@@ -36,6 +36,7 @@ WITHIN_THE_RECORDING = {  # of 2.4 s over 60 mm, and 5 N m at most
     "torque_saturation": {"limit_n_m": 3.0},
     "external_force": {"start_s": 0.8, "end_s": 1.2},
     "local_friction": {"begin_m": 0.02, "end_m": 0.04, "flank_m": 0.002},
+    "local_torque_constant": {"begin_m": 0.02, "end_m": 0.04, "flank_m": 0.002},
     "end_stop": {"edge_m": 0.05},
     "thermal_growth": {"time_constant_s": 1.0},
 }
